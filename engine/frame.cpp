@@ -9,6 +9,7 @@
 #include "core/interrupt.h"
 #include "core/timing.h"
 #include "engine/balance/load_balance.h"
+#include "engine/binning/chunk_binning.h"
 #include "engine/session.h"
 #include "engine/tile_ownership.h"
 #include "engine/verification.h"
@@ -31,19 +32,10 @@ bool spends_light(const FramePlan& plan) {
   return plan.lit || plan.shading == Shading::Local;
 }
 
-/// The rectangles of a screen this rank's group covers.
-std::vector<Rect> parts_of(const FramePlan& plan, std::size_t screen) {
-  std::vector<Rect> parts;
-  for (const ScreenRect& rect : plan.mine.area) {
-    if (rect.screen == screen) parts.push_back(rect.pixels);
-  }
-  return parts;
-}
-
 }  // namespace
 
 void prepare(Session& session, const FramePlan& plan) {
-  if (!plan.mine.area.empty()) {
+  if (!plan.mine.area.empty() || bins_chunks(session, plan)) {
     if (plan.primary == Primary::Rays) {
       (void)session.primary_rays(plan.mine.objects, plan.rays);
     } else {
@@ -54,12 +46,21 @@ void prepare(Session& session, const FramePlan& plan) {
   if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
 }
 
-void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys) {
+void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+               FrameTimes& spent) {
   Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
   const trace::Span span("raster");
+  std::optional<ScreenChunks> chunks;
+  if (bins_chunks(session, plan)) chunks = find_chunks(session, plan, rasterizer, views, spent);
   for (std::size_t screen = 0; screen < views.size(); ++screen) {
-    const std::vector<Rect> parts = parts_of(plan, screen);
-    if (!parts.empty()) rasterizer.draw(views[screen], screen, parts, keys);
+    const std::vector<Rect> parts = parts_of(plan.mine.area, screen);
+    if (parts.empty()) continue;
+    if (chunks) {
+      rasterizer.draw(views[screen], screen, parts, (*chunks)[screen], keys);
+    } else {
+      rasterizer.draw(views[screen], screen, parts, keys);
+    }
+    spent.raster += rasterizer.stats();
   }
 }
 
@@ -69,9 +70,9 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
   const trace::Span span("primary rays");
   PrimaryRayStats stats;
   // Ranks that draw for others do not know what those want.
-  const bool draws_own = session.comm().size() == 1 || plan.distribution == Distribution::SortFirst;
+  const bool draws_own = session.comm().size() == 1 || draws_alone(plan.distribution);
   for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
-    const std::vector<Rect> parts = parts_of(plan, screen);
+    const std::vector<Rect> parts = parts_of(plan.mine.area, screen);
     if (parts.empty()) continue;
     std::vector<View> views;
     views.reserve(jittered.size());
@@ -94,11 +95,12 @@ FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const Ji
   if (plan.primary == Primary::Rays) {
     spent.primary = trace_primary(session, plan, jittered, keys, spent.work);
   } else {
-    for (std::size_t i = 0; i < jittered.size(); ++i) rasterize(session, plan, jittered[i].views, *keys[i]);
-    spent.work.keys_ms = watch.ms() * session.threads();  // what each tile took of it is not known
+    for (std::size_t i = 0; i < jittered.size(); ++i) rasterize(session, plan, jittered[i].views, *keys[i], spent);
+    spent.work.keys_ms =
+        (watch.ms() - spent.chunk_exchange_ms) * session.threads();  // what each tile took of it is not known
     session.balance().add_keys(plan.layout, plan.tiles, spent.work.keys_ms);
   }
-  spent.primary_ms = watch.ms();
+  spent.primary_ms = watch.ms() - spent.chunk_exchange_ms;
   return spent;
 }
 
@@ -139,7 +141,7 @@ void add_light(Session& session, const FramePlan& plan, const DeferredShader& sh
 
 /// Whether what is composited goes on to whoever has time to light it.
 bool balances_light(const Session& session, const FramePlan& plan) {
-  return plan.balance != Balance::Static && plan.distribution != Distribution::SortFirst && plan.lit &&
+  return plan.balance != Balance::Static && !draws_alone(plan.distribution) && plan.lit &&
          plan.shading == Shading::Deferred && session.ranks() > 1;
 }
 
@@ -150,7 +152,7 @@ void move_to_owners(Session& session, const FramePlan& plan, std::optional<TileO
   } else if (!ownership) {
     ownership.emplace(session.comm(), plan.layout, frame.owned);
   }
-  if (plan.distribution == Distribution::SortFirst) return;
+  if (draws_alone(plan.distribution)) return;
   ownership->move_to_owners(session.comm(), *frame.keys, frame.owned);
   frame.owned = ownership->mine();
 }
@@ -282,6 +284,8 @@ FrameWork& FrameWork::operator+=(const FrameWork& other) {
 FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   primary_ms += other.primary_ms;
   primary += other.primary;
+  raster += other.raster;
+  chunk_exchange_ms += other.chunk_exchange_ms;
   composite_ms += other.composite_ms;
   exchange_ms += other.exchange_ms;
   light_ms += other.light_ms;
@@ -355,7 +359,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
 }
 
 std::size_t max_round_size(Session& session, const FramePlan& plan) {
-  if (session.comm().size() > 1 && plan.distribution != Distribution::SortFirst) return 1;
+  if (session.comm().size() > 1 && !draws_alone(plan.distribution)) return 1;
   if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
   if (session.shader(plan.rays).shades_one_by_one()) return 1;
   // Keys and colours of a round are in memory together.

@@ -10,6 +10,7 @@
 #include "engine/aov.h"
 #include "engine/plan.h"
 #include "image/tiles.h"
+#include "raster/raster_stats.h"
 #include "rt/ray_counts.h"
 #include "rt/sampling/sampler.h"
 #include "scene/view.h"
@@ -56,6 +57,8 @@ struct FrameWork {
 struct FrameTimes {
   double primary_ms = 0.0;  ///< the keys, drawn or traced
   PrimaryRayStats primary;
+  RasterStats raster;              ///< of keys that were drawn
+  double chunk_exchange_ms = 0.0;  ///< before they are drawn, waiting included
   double composite_ms = 0.0;
   double exchange_ms = 0.0;      ///< bringing keys to the owners of their tiles, and light that others lit back
   double light_ms = 0.0;         ///< photons and light, until this rank's are done
@@ -87,8 +90,10 @@ struct JitteredViews {
   FrameSample sample;
 };
 
-/// Draws this rank's objects into its group's tiles of `keys`: the frame's first step, before any rank meets another.
-void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys);
+/// Draws this rank's objects into its group's tiles of `keys`: the frame's first step. Collective under sort-middle;
+/// else before any rank meets another. Adds to `spent` what it counts.
+void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+               FrameTimes& spent);
 /// Makes the keys of several samples by primary rays, one layer each, in place of rasterize(); all samples want the
 /// same pixels. Adds to `work` and returns the ray counts.
 PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,

@@ -139,6 +139,13 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
     stats.rays.primary += traced.rays;
     stats.rays.invalid += traced.invalid;
   }
+  for (const RasterStats& drawn : all_gather_value(comm, times.raster)) {
+    const double cull_ms = std::max(stats.raster.cull_ms, drawn.cull_ms);
+    stats.raster += drawn;
+    stats.raster.cull_ms = cull_ms;
+  }
+  if (plan.distribution == Distribution::SortMiddle)
+    stats.times.push_back({"exchange-chunks", slowest(comm, times.chunk_exchange_ms)});
   stats.times.push_back({"composite", slowest(comm, times.composite_ms + times.exchange_ms)});
   // The shader adds up what its threads took; a frame waits for them side by side.
   for (const PassTime& pass : times.passes) {

@@ -18,6 +18,7 @@
 #include "image/image.h"
 #include "image/tiles.h"
 #include "image/tone.h"
+#include "raster/raster_stats.h"
 #include "rt/passes/pass_id.h"
 #include "rt/ray_counts.h"
 #include "scene/view.h"
@@ -83,6 +84,7 @@ struct RunStats {
   std::vector<PassPlan> passes;
   std::vector<PassTime> times;                   ///< of each pass that ran: the slowest rank
   RayCounts rays;                                ///< summed over ranks
+  RasterStats raster;                            ///< counts summed over ranks, times the slowest rank's
   std::size_t bytes_sent = 0;                    ///< by the frame, to the screens included; summed over ranks
   std::vector<std::uint64_t> memory_peak_bytes;  ///< per rank
   int ranks = 1;

@@ -16,6 +16,7 @@
 #include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
 #include "engine/balance/load_balance.h"
+#include "engine/binning/chunk_binning.h"
 #include "engine/display/background.h"
 #include "engine/session.h"
 #include "rt/passes/pass_list.h"
@@ -444,6 +445,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.primary = primary.primary;
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", primary.why));
+  if (plan.distribution == Distribution::SortMiddle) plan.explained.push_back(explain_binning(plan, ranks));
   if (plan.primary == Primary::Raster) session.start_gl();
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);

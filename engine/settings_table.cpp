@@ -453,9 +453,9 @@ std::vector<Setting> make_table() {
 
       // Who does what.
       {.name = "distribute",
-       .help = "how the work is shared: sort-first, sort-last, hybrid or auto",
+       .help = fmt::format("how the work is shared: {} or auto", distribution_names()),
        .value = text(
-           "NAME", "sort-first, sort-last, hybrid, auto",
+           "NAME", distribution_names() + ", auto",
            [](Settings& s) -> std::optional<Distribution>& { return s.frame.distribution; }, parse_distribution_or_auto,
            [](const std::optional<Distribution>& value) { return std::string(value ? name_of(*value) : "auto"); }),
        .initial = "auto",

@@ -242,10 +242,11 @@ VerifyCounts verify_frame(int ranks, const std::vector<std::pair<std::string, st
 
 TEST(Verification, EveryWayToDrawAFrameGivesOtherRanksTheSameBits) {
   using Chosen = std::vector<std::pair<std::string, std::string>>;
-  for (const char* const distribution : {"sort-first", "sort-last", "hybrid"}) {
+  for (const Distribution distribution : kDistributions) {
+    const std::string name(name_of(distribution));
     for (const char* const primary : {"raster", "rays"}) {
-      const Chosen chosen{{"distribute", distribution}, {"primary", primary}};
-      EXPECT_EQ(verify_frame(3, chosen, [](int, Frame&) {}), (VerifyCounts{.tiles = 9})) << distribution << primary;
+      const Chosen chosen{{"distribute", name}, {"primary", primary}};
+      EXPECT_EQ(verify_frame(3, chosen, [](int, Frame&) {}), (VerifyCounts{.tiles = 9})) << name << primary;
     }
   }
   for (const Chosen& chosen :

@@ -62,30 +62,12 @@ struct Batch {
   std::uint64_t chunks = 0;
 };
 
-/// The matrix of an instance for vertices in mesh coordinates. Everything is taken relative to the eye in double before
-/// it is rounded, so that a large common offset of scene and eye costs nothing.
-glm::dmat4 clip_from_mesh(const Instance& instance, const glm::dmat4& clip_from_eye_relative, const glm::dvec3& eye) {
-  glm::dmat4 to_eye_relative = instance.to_world;
-  to_eye_relative[3] -= glm::dvec4(eye, 0.0);
-  return clip_from_eye_relative * to_eye_relative;
-}
-
 std::array<float, 16> rounded(const glm::dmat4& matrix) {
   std::array<float, 16> result{};
   for (std::size_t i = 0; i < 16; ++i) {
     result.at(i) = static_cast<float>(matrix[static_cast<int>(i / 4)][static_cast<int>(i % 4)]);
   }
   return result;
-}
-
-bool drawable(const glm::dmat4& matrix) {
-  constexpr double kMaxElement = 1e30;  // leaves room for the product with a position
-  for (int column = 0; column < 4; ++column) {
-    for (int row = 0; row < 4; ++row) {
-      if (!(std::abs(matrix[column][row]) < kMaxElement)) return false;
-    }
-  }
-  return true;
 }
 
 void append(Batch& batch, const Run& run) {
@@ -219,21 +201,37 @@ Rect Culler::pixels(const Box& box) const {
           pixel(std::ceil((1.0 - low.y) * half_height + kPixelMargin), part_.y0, part_.y1)};
 }
 
-DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View& view, const Rect& part,
-                        Culling culling, int threads) {
+glm::dmat4 clip_from_mesh(const Instance& instance, const glm::dmat4& clip_from_eye_relative, const glm::dvec3& eye) {
+  glm::dmat4 to_eye_relative = instance.to_world;
+  to_eye_relative[3] -= glm::dvec4(eye, 0.0);
+  return clip_from_eye_relative * to_eye_relative;
+}
+
+bool is_drawable(const glm::dmat4& matrix) {
+  constexpr double kMaxElement = 1e30;  // leaves room for the product with a position
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      if (!(std::abs(matrix[column][row]) < kMaxElement)) return false;
+    }
+  }
+  return true;
+}
+
+DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<const Piece> pieces, const View& view,
+                        const Rect& part, Culling culling, int threads) {
   const glm::dmat4 from_eye_relative = clip_from_world(view, view.eye);
   const auto matrix_of = [&](std::uint32_t instance) {
     return clip_from_mesh(scene.instances[instance], from_eye_relative, view.eye);
   };
 
   constexpr std::size_t kBatchPieces = 64;
-  std::vector<Batch> batches((geometry.pieces.size() + kBatchPieces - 1) / kBatchPieces);
+  std::vector<Batch> batches((pieces.size() + kBatchPieces - 1) / kBatchPieces);
   const auto cull_batch = [&](std::size_t index) {
     const std::size_t first = index * kBatchPieces;
-    const std::size_t count = std::min(kBatchPieces, geometry.pieces.size() - first);
-    for (const Piece& piece : std::span(geometry.pieces).subspan(first, count)) {
+    const std::size_t count = std::min(kBatchPieces, pieces.size() - first);
+    for (const Piece& piece : pieces.subspan(first, count)) {
       const glm::dmat4 matrix = matrix_of(piece.instance);
-      if (drawable(matrix)) cull_piece(geometry, piece, Culler(matrix, view, part), part, culling, batches[index]);
+      if (is_drawable(matrix)) cull_piece(geometry, piece, Culler(matrix, view, part), part, culling, batches[index]);
     }
   };
   // Starting threads costs more than a few batches.
@@ -247,7 +245,7 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View
     list.triangles_drawn += batch.triangles;
     list.chunks_drawn += batch.chunks;
   }
-  for (const Piece& piece : geometry.pieces) {
+  for (const Piece& piece : pieces) {
     list.triangles_culled += piece.last - piece.first;
     list.chunks_culled += piece.chunks;
   }

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <span>
 #include <vector>
 
 #include "raster/geometry.h"
@@ -91,9 +93,17 @@ enum class Culling {
   None,    ///< everything is sent to GL, for tests and comparisons
 };
 
-/// Culls the share against `part`, a rectangle inside the view. Instances whose matrix overflows a float are left out,
-/// by the same rule on every rank.
-[[nodiscard]] DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View& view, const Rect& part,
-                                      Culling culling, int threads);
+/// The matrix of an instance for vertices in mesh coordinates. Everything is taken relative to the eye in double before
+/// it is rounded, so that a large common offset of scene and eye costs nothing. `clip_from_eye_relative`:
+/// clip_from_world(view, view.eye).
+[[nodiscard]] glm::dmat4 clip_from_mesh(const Instance& instance, const glm::dmat4& clip_from_eye_relative,
+                                        const glm::dvec3& eye);
+/// Whether a matrix, and its product with a position, fits a float: instances are left out where it does not, by the
+/// same rule on every rank.
+[[nodiscard]] bool is_drawable(const glm::dmat4& clip_from_mesh);
+
+/// Culls `pieces` of the geometry against `part`, a rectangle inside the view.
+[[nodiscard]] DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<const Piece> pieces,
+                                      const View& view, const Rect& part, Culling culling, int threads);
 
 }  // namespace hpr

@@ -108,7 +108,7 @@ TEST(DrawList, NeighbouringChunksBecomeOneCommand) {
   finish_scene(scene);
   const Geometry geometry = collect_geometry(scene, std::array{test::all_of(scene)});
   const View view = test::perspective_view({100, 100}, {0.0, 0.0, 8.0});
-  const DrawList list = make_draw_list(scene, geometry, view, view.block, Culling::Chunks, 1);
+  const DrawList list = make_draw_list(scene, geometry, geometry.pieces, view, view.block, Culling::Chunks, 1);
   ASSERT_EQ(list.commands.size(), 2U);
   EXPECT_EQ(list.commands[0].count, 3U * 20000U);
   EXPECT_EQ(list.records[0].first_surface, 0U);
@@ -128,8 +128,8 @@ TEST(DrawList, IsTheSameForAnyNumberOfThreads) {
   const Geometry geometry = collect_geometry(scene, std::array{test::all_of(scene)});
   const View view = test::perspective_view({300, 200});
   const Rect part{100, 50, 180, 120};
-  const DrawList one = make_draw_list(scene, geometry, view, part, Culling::Chunks, 1);
-  const DrawList four = make_draw_list(scene, geometry, view, part, Culling::Chunks, 4);
+  const DrawList one = make_draw_list(scene, geometry, geometry.pieces, view, part, Culling::Chunks, 1);
+  const DrawList four = make_draw_list(scene, geometry, geometry.pieces, view, part, Culling::Chunks, 4);
   ASSERT_EQ(one.commands.size(), four.commands.size());
   EXPECT_GT(one.commands.size(), 10U);
   EXPECT_GT(one.triangles_culled, one.triangles_drawn);

@@ -72,8 +72,13 @@ void append_pieces(const InstanceRange& part, const ChunkRun& run, Geometry& geo
                                     begin + static_cast<std::ptrdiff_t>(run.last), meets);
   const auto end = begin + static_cast<std::ptrdiff_t>(run.last);
   while (chunk != end && chunk->first < part.range.last) {
-    Piece piece{part.instance, std::max(chunk->first, part.range.first), 0, static_cast<std::size_t>(chunk - begin), 0,
-                chunk->box};
+    Piece piece{part.instance,
+                std::max(chunk->first, part.range.first),
+                0,
+                static_cast<std::size_t>(chunk - begin),
+                0,
+                chunk->box,
+                geometry.numbers().last};
     for (; chunk != end && chunk->first < part.range.last && piece.chunks < kPieceChunks; ++chunk, ++piece.chunks) {
       piece.last = std::min(chunk->first + chunk->count, part.range.last);
       piece.box.add(chunk->box);
@@ -112,6 +117,40 @@ Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> obje
   }
   for (const InstanceRange& part : parts) append_pieces(part, runs[scene.instances[part.instance].mesh], geometry);
   return geometry;
+}
+
+namespace {
+
+/// Of a piece the chunks that have numbers in `range`, which has some of them.
+Piece cut(const Geometry& geometry, const Piece& piece, const ChunkRange& range) {
+  Piece part = piece;
+  const std::uint32_t first = std::max(range.first, piece.number);
+  const std::uint32_t last = std::min(range.last, piece.numbers().last);
+  part.first_chunk += first - piece.number;
+  part.chunks = last - first;
+  part.number = first;
+  const Chunk& begin = geometry.chunks[part.first_chunk];
+  const Chunk& end = geometry.chunks[part.first_chunk + part.chunks - 1];
+  part.first = std::max(piece.first, begin.first);
+  part.last = std::min(piece.last, end.first + end.count);
+  part.box = begin.box;
+  for (const Chunk& chunk : std::span(geometry.chunks).subspan(part.first_chunk, part.chunks)) part.box.add(chunk.box);
+  return part;
+}
+
+}  // namespace
+
+std::vector<Piece> pieces_of(const Geometry& geometry, std::span<const ChunkRange> chunks) {
+  std::vector<Piece> pieces;
+  for (const ChunkRange& range : chunks) {
+    auto piece = std::ranges::partition_point(geometry.pieces,
+                                              [&](const Piece& each) { return each.numbers().last <= range.first; });
+    for (; piece != geometry.pieces.end() && piece->number < range.last; ++piece) {
+      const bool whole = range.first <= piece->number && piece->numbers().last <= range.last;
+      pieces.push_back(whole ? *piece : cut(geometry, *piece, range));
+    }
+  }
+  return pieces;
 }
 
 }  // namespace hpr

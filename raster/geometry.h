@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "scene/chunk_range.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -45,6 +46,9 @@ struct Piece {
   std::size_t first_chunk = 0;
   std::size_t chunks = 0;
   Box box;
+  std::uint32_t number = 0;  ///< of its first chunk, see ChunkRange: the chunks of the pieces before it
+
+  [[nodiscard]] ChunkRange numbers() const { return {number, number + static_cast<std::uint32_t>(chunks)}; }
 };
 
 /// One rank's part of a scene, ready for upload: the triangles of each mesh once, however many instances show it.
@@ -53,6 +57,9 @@ struct Geometry {
   std::vector<glm::uvec3> triangles;  ///< into vertices
   std::vector<Chunk> chunks;
   std::vector<Piece> pieces;  ///< in ascending order of surface id
+
+  /// All of its chunks, by their numbers.
+  [[nodiscard]] ChunkRange numbers() const { return {0, pieces.empty() ? 0 : pieces.back().numbers().last}; }
 };
 
 /// Triangles of a chunk: finer ones cost cull time (under 50 ns each), coarser ones draw more than the rectangle needs.
@@ -63,5 +70,8 @@ inline constexpr std::size_t kPieceChunks = 64;
 /// The surfaces `objects` of `scene`; the ranges may come in any order, overlap and reach past the scene's triangles.
 /// Throws Error (Limit) when they have more triangles than an indirect draw can address.
 [[nodiscard]] Geometry collect_geometry(const Scene& scene, std::span<const SurfaceRange> objects);
+
+/// The pieces of some chunks: those of the geometry, cut where a range begins or ends inside of one. `chunks` ascend.
+[[nodiscard]] std::vector<Piece> pieces_of(const Geometry& geometry, std::span<const ChunkRange> chunks);
 
 }  // namespace hpr

@@ -75,6 +75,38 @@ TEST(Geometry, LongMeshesAreCutIntoPieces) {
   EXPECT_LT(geometry.vertices.size(), 102000U);
 }
 
+TEST(Geometry, PiecesOfRangesHoldTheirChunksAlone) {
+  const Scene scene = test::mixed_scene();
+  Geometry geometry = collect_geometry(scene, std::array{SurfaceRange{700, scene.triangles}});
+  const std::uint32_t count = geometry.numbers().last;
+  std::uint64_t chunks = 0;
+  for (const Piece& piece : geometry.pieces) {
+    EXPECT_EQ(piece.number, chunks);
+    chunks += piece.chunks;
+  }
+  ASSERT_EQ(count, chunks);
+  ASSERT_GT(count, 20U);
+  const auto all = surfaces_of(scene, geometry);
+  const auto in = [&](std::vector<ChunkRange> ranges) {
+    Geometry part = geometry;
+    part.pieces = pieces_of(geometry, ranges);
+    return surfaces_of(scene, part);
+  };
+  EXPECT_EQ(in({{0, count}}), all);
+  std::map<std::uint32_t, int> joined;
+  for (std::uint32_t number = 0; number < count; ++number) {
+    const auto one = in({{number, number + 1}});
+    EXPECT_LE(one.size(), kChunkTriangles);
+    joined.insert(one.begin(), one.end());
+  }
+  EXPECT_EQ(joined, all);
+  auto ends = in({{0, 3}});
+  ends.merge(in({{5, count}}));
+  EXPECT_EQ(in({{0, 3}, {5, count}}), ends);
+  EXPECT_EQ(ends.size() + in({{3, 5}}).size(), all.size());
+  EXPECT_TRUE(pieces_of(geometry, {}).empty());
+}
+
 TEST(Geometry, OfNothingIsEmpty) {
   Scene scene;
   finish_scene(scene);

@@ -119,7 +119,8 @@ class Rasterizer::Implementation {
     std::vector<glm::uvec3>().swap(geometry_.triangles);
   }
 
-  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
+  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, std::span<const Piece> pieces,
+            TileLayer<Key>& layer) {
     const Size size = view.size();
     HPR_CHECK(size.width <= kRasterLimit && size.height <= kRasterLimit);
     HPR_CHECK(screen < layer.layout().screens() && layer.layout().size(screen) == size);
@@ -132,11 +133,17 @@ class Rasterizer::Implementation {
     }
     for (const Rect& wanted : parts) {
       const Rect part = intersection(wanted, {0, 0, size.width, size.height});
-      if (!part.empty()) draw_part(view, screen, part, layer);
+      if (!part.empty()) draw_part(view, screen, part, pieces, layer);
     }
     check_gl(context_.gl(), "drawing");
   }
 
+  [[nodiscard]] ChunkBins bin(const View& view, const ChunkRange& chunks,
+                              std::span<const std::vector<Rect>> areas) const {
+    return bin_chunks(scene_, geometry_, chunks, view, areas, threads_);
+  }
+
+  [[nodiscard]] const Geometry& geometry() const { return geometry_; }
   [[nodiscard]] const RasterStats& stats() const { return stats_; }
 
  private:
@@ -195,13 +202,14 @@ class Rasterizer::Implementation {
                                  static_cast<GLsizei>(span.count), sizeof(DrawCommand));
   }
 
-  void draw_part(const View& view, std::size_t screen, const Rect& part, TileLayer<Key>& layer) {
+  void draw_part(const View& view, std::size_t screen, const Rect& part, std::span<const Piece> pieces,
+                 TileLayer<Key>& layer) {
     Stopwatch watch;
     const auto lap = [&watch](double& ms) {
       ms += watch.ms();
       watch.restart();
     };
-    const DrawList list = make_draw_list(scene_, geometry_, view, part, culling_, threads_);
+    const DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, culling_, threads_);
     stats_.triangles_drawn += list.triangles_drawn;
     stats_.triangles_culled += list.triangles_culled;
     stats_.chunks_drawn += list.chunks_drawn;
@@ -247,7 +255,20 @@ Rasterizer::Rasterizer(GlContext& context, const Scene& scene, std::span<const S
 Rasterizer::~Rasterizer() = default;
 
 void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
-  implementation_->draw(view, screen, parts, layer);
+  implementation_->draw(view, screen, parts, implementation_->geometry().pieces, layer);
+}
+
+void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts,
+                      std::span<const ChunkRange> chunks, TileLayer<Key>& layer) {
+  implementation_->draw(view, screen, parts, pieces_of(implementation_->geometry(), chunks), layer);
+}
+
+ChunkRange Rasterizer::chunks() const {
+  return implementation_->geometry().numbers();
+}
+
+ChunkBins Rasterizer::bin(const View& view, const ChunkRange& chunks, std::span<const std::vector<Rect>> areas) const {
+  return implementation_->bin(view, chunks, areas);
 }
 
 const RasterStats& Rasterizer::stats() const {

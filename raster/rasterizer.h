@@ -4,28 +4,18 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "image/key.h"
 #include "image/tiles.h"
+#include "raster/chunk_bins.h"
 #include "raster/draw_list.h"
 #include "raster/gl_context.h"
+#include "raster/raster_stats.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
 namespace hpr {
-
-/// Counts and times of the last draw().
-struct RasterStats {
-  std::uint64_t triangles_drawn = 0;  ///< sent to GL, summed over the parts
-  std::uint64_t triangles_culled = 0;
-  std::uint64_t chunks_drawn = 0;
-  std::uint64_t chunks_culled = 0;
-  std::uint64_t pixels_read = 0;
-  double cull_ms = 0.0;
-  double draw_ms = 0.0;  ///< upload of the commands, clear and GL's drawing, to its end
-  double read_ms = 0.0;
-  double pack_ms = 0.0;
-};
 
 /// Draws one rank's part of a scene into keys by OpenGL.
 ///
@@ -47,6 +37,16 @@ class Rasterizer {
   /// reach past it. Depths are rounded to the layer's depth_format() before they are compared, so that the triangles'
   /// dealing changes nothing then either. Throws Error as the constructor does.
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
+  /// Draws some of the chunks, in ascending order; nothing else is culled.
+  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, std::span<const ChunkRange> chunks,
+            TileLayer<Key>& layer);
+
+  /// All chunks that it holds.
+  [[nodiscard]] ChunkRange chunks() const;
+  /// Which of some chunks are to be drawn for which areas of a view: see raster/chunk_bins.h. Takes part in no drawing,
+  /// and needs no context.
+  [[nodiscard]] ChunkBins bin(const View& view, const ChunkRange& chunks,
+                              std::span<const std::vector<Rect>> areas) const;
 
   [[nodiscard]] const RasterStats& stats() const;
 

@@ -78,7 +78,9 @@ def main():
         folder = pathlib.Path(scratch)
         pictures = {}
         for case, arguments in {"one sample": [], "four samples": ["--spp", "4"],
-                                "four samples, three ranks": ["--spp", "4", "--ranks", "3", "--distribute", "sort-last"]}.items():
+                                "four samples, three ranks": ["--spp", "4", "--ranks", "3", "--distribute", "sort-last"],
+                                "culled by three": ["--spp", "4", "--ranks", "3", "--distribute", "sort-middle", "--primary", "raster"],
+                                "drawn": ["--spp", "4", "--primary", "raster"]}.items():
             render(folder, "-o", "a.exr", "--raw", "a.keys", "--aov", ALL, *arguments)
             width, height, layers = exr.read(folder / "a.exr")
             expect((width, height) == SIZE, f"{case}: {width}x{height} pixels")
@@ -89,9 +91,10 @@ def main():
             pictures[case] = layers
         ranks = {int(rank) for rank in pictures["four samples, three ranks"]["rank.X"]}
         expect(ranks == {0, 1, 2}, f"ranks {ranks} lit the picture of three")
-        one, three = pictures["four samples"], pictures["four samples, three ranks"]
-        for name in CHANNELS - {"rank.X"}:
-            expect(one[name].tobytes() == three[name].tobytes(), f"{name} has other bits with three ranks")
+        for alone, shared in (("four samples", "four samples, three ranks"), ("drawn", "culled by three")):
+            for name in CHANNELS - {"rank.X"}:
+                expect(pictures[alone][name].tobytes() == pictures[shared][name].tobytes(), f"{shared}: {name} has other bits")
+        one = pictures["four samples"]
         expect(one["R"].tobytes() != pictures["one sample"]["R"].tobytes(), "four samples are one")
 
         for samples in (2, 7):

@@ -16,7 +16,8 @@ from program import expect, failures, run, run_to
 from quads import BACK, Quads
 
 SIDE = 128  # pixels, of which 4 x 4 tiles of ranks are made
-WAYS = [(), ("--ranks", "3", "--distribute", "sort-first"), ("--ranks", "3", "--distribute", "sort-last"),
+WAYS = [(), ("--ranks", "3", "--distribute", "sort-first"), ("--ranks", "3", "--distribute", "sort-middle"),
+        ("--ranks", "3", "--distribute", "sort-last"),
         ("--ranks", "3", "--distribute", "hybrid", "--groups", "2"), ("--ranks", "3", "--data", "partitioned")]
 SHOWN = ["normal", "uv", "wireframe", "ids", "cost", "overdraw", "ao"]
 BLACK, WHITE = (0, 0, 0), (255, 255, 255)

@@ -19,7 +19,8 @@ SIGNS = list(itertools.product((1, -1), repeat=3))
 ROWS = [(shared, indices, sides) for shared in (True, False) for indices in (FRONT, BACK) for sides in (False, True, None)]
 SIZE = 8  # pixels of a cell
 WIDTH, HEIGHT = SIZE * len(SIGNS), SIZE * len(ROWS)
-WAYS = [(), ("--ranks", "3", "--distribute", "sort-first"), ("--ranks", "3", "--distribute", "sort-last"),
+WAYS = [(), ("--ranks", "3", "--distribute", "sort-first"), ("--ranks", "3", "--distribute", "sort-middle"),
+        ("--ranks", "3", "--distribute", "sort-last"),
         ("--ranks", "3", "--distribute", "sort-last", "--strategy", "binary-swap", "--data", "partitioned")]
 
 

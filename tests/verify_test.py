@@ -21,6 +21,7 @@ def pictures(folder):
     """The same bits with and without, and every tile of every sample was drawn twice."""
     for name, ranks, samples, options in (("plain", 1, 4, []), ("first", 3, 4, []),
                                           ("last", 2, 1, ["--distribute", "sort-last"]),
+                                          ("middle", 3, 2, ["--distribute", "sort-middle", "--primary", "raster"]),
                                           ("rays", 3, 4, ["--distribute", "sort-last", "--primary", "rays"]),
                                           ("adaptive", 2, 32, ["--adaptive", "--primary", "rays"])):
         bits = []

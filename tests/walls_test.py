@@ -40,7 +40,7 @@ def strategies():
 def ways():
     """Options of the runs that must all show the same."""
     every = [["--distribute", "sort-last", "--strategy", name] for name in strategies()]
-    every += [["--distribute", "sort-first"], ["--distribute", "hybrid", "--groups", "2"], ["--distribute", "auto"]]
+    every += [["--distribute", "sort-first"], ["--distribute", "sort-middle"], ["--distribute", "hybrid", "--groups", "2"], ["--distribute", "auto"]]
     return every
 
 

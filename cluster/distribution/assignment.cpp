@@ -1,9 +1,9 @@
 #include "cluster/distribution/assignment.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -14,8 +14,6 @@
 
 namespace hpr {
 namespace {
-
-constexpr std::array kDistributions{Distribution::SortFirst, Distribution::SortLast, Distribution::Hybrid};
 
 std::size_t tiles_in(const Rect& rect) {
   const auto along = [](int from, int to) {
@@ -129,6 +127,8 @@ std::string_view name_of(Distribution distribution) {
   switch (distribution) {
     case Distribution::SortFirst:
       return "sort-first";
+    case Distribution::SortMiddle:
+      return "sort-middle";
     case Distribution::SortLast:
       return "sort-last";
     case Distribution::Hybrid:
@@ -137,8 +137,10 @@ std::string_view name_of(Distribution distribution) {
   return "";
 }
 
-std::span<const Distribution> all_distributions() {
-  return kDistributions;
+std::string distribution_names() {
+  std::vector<std::string_view> names;
+  for (const Distribution distribution : kDistributions) names.push_back(name_of(distribution));
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 Distribution parse_distribution(std::string_view name, std::span<const std::string> further) {
@@ -197,12 +199,19 @@ std::vector<std::size_t> tiles_of(const FrameLayout& layout, std::span<const Scr
   return tiles;
 }
 
+std::vector<Rect> parts_of(std::span<const ScreenRect> area, std::size_t screen) {
+  std::vector<Rect> parts;
+  for (const ScreenRect& rect : area) {
+    if (rect.screen == screen) parts.push_back(rect.pixels);
+  }
+  return parts;
+}
+
 std::vector<Assignment> assign(Distribution distribution, const Scene& scene, const FrameLayout& layout, int ranks,
                                int groups) {
-  // Sort-first is a group per rank, sort-last one group of all: hybrid nests them, so one rule makes all three.
-  const int group_count = distribution == Distribution::SortFirst  ? ranks
-                          : distribution == Distribution::SortLast ? 1
-                                                                   : groups;
+  // Sort-first and sort-middle are a group per rank, sort-last one group of all: hybrid nests them, so one rule makes
+  // all of them.
+  const int group_count = draws_alone(distribution) ? ranks : distribution == Distribution::SortLast ? 1 : groups;
   const auto members = make_groups(ranks, group_count);
   std::vector<int> weights;
   weights.reserve(members.size());

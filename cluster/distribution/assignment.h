@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -13,13 +14,20 @@ namespace hpr {
 
 /// How the work of a frame is dealt to the ranks.
 enum class Distribution {
-  SortFirst,  ///< each rank draws the whole scene, culled to its own tiles
-  SortLast,   ///< each rank draws its own objects over the whole frame; keys are composited
-  Hybrid,     ///< groups of ranks own tiles (sort-first), ranks of a group share the objects (sort-last)
+  SortFirst,   ///< each rank draws the whole scene, culled to its own tiles
+  SortMiddle,  ///< each rank culls its share of the scene to all tiles; their owners draw what was found for them
+  SortLast,    ///< each rank draws its own objects over the whole frame; keys are composited
+  Hybrid,      ///< groups of ranks own tiles (sort-first), ranks of a group share the objects (sort-last)
 };
+inline constexpr std::array kDistributions{Distribution::SortFirst, Distribution::SortMiddle, Distribution::SortLast,
+                                           Distribution::Hybrid};
 [[nodiscard]] std::string_view name_of(Distribution distribution);
-/// Every distribution, in the order reports list them.
-[[nodiscard]] std::span<const Distribution> all_distributions();
+/// The names of kDistributions: "sort-first, sort-last, ...".
+[[nodiscard]] std::string distribution_names();
+/// Whether each rank has tiles of its own, which it alone draws: nothing is composited.
+[[nodiscard]] constexpr bool draws_alone(Distribution distribution) {
+  return distribution == Distribution::SortFirst || distribution == Distribution::SortMiddle;
+}
 /// Throws Error (Usage) with the choices and `further` ones that the caller has.
 [[nodiscard]] Distribution parse_distribution(std::string_view name, std::span<const std::string> further = {});
 
@@ -59,6 +67,9 @@ struct Assignment {
 
 /// The tiles of some rectangles, ascending.
 [[nodiscard]] std::vector<std::size_t> tiles_of(const FrameLayout& layout, std::span<const ScreenRect> area);
+
+/// The rectangles that an area has on one screen.
+[[nodiscard]] std::vector<Rect> parts_of(std::span<const ScreenRect> area, std::size_t screen);
 
 /// Every rank's assignment, computed alike on all ranks. `groups` counts for Hybrid only.
 [[nodiscard]] std::vector<Assignment> assign(Distribution distribution, const Scene& scene, const FrameLayout& layout,

@@ -190,7 +190,7 @@ TEST(Groups, AreContiguousAndEvenlySized) {
 TEST(Assign, EverySurfaceIsDrawnExactlyOnceForEveryTile) {
   const Scene scene = strewn({40, 1, 0, 30});
   const FrameLayout layout({{333, 217}, {65, 64}});
-  for (const Distribution distribution : {Distribution::SortFirst, Distribution::SortLast, Distribution::Hybrid}) {
+  for (const Distribution distribution : kDistributions) {
     for (int ranks = 1; ranks <= 17; ++ranks) {
       const int groups = default_groups(ranks);
       const auto assignments = assign(distribution, scene, layout, ranks, groups);
@@ -211,7 +211,7 @@ TEST(Assign, EverySurfaceIsDrawnExactlyOnceForEveryTile) {
         }
         expect_partition(partition, scene.triangles);
       }
-      EXPECT_EQ(static_cast<int>(areas.size()), distribution == Distribution::SortFirst  ? ranks
+      EXPECT_EQ(static_cast<int>(areas.size()), draws_alone(distribution)                ? ranks
                                                 : distribution == Distribution::SortLast ? 1
                                                                                          : groups);
       (void)tiles_of_areas(layout, areas);
@@ -220,7 +220,7 @@ TEST(Assign, EverySurfaceIsDrawnExactlyOnceForEveryTile) {
 }
 
 TEST(Distributions, HaveNamesThatParseBack) {
-  for (const Distribution distribution : {Distribution::SortFirst, Distribution::SortLast, Distribution::Hybrid}) {
+  for (const Distribution distribution : kDistributions) {
     EXPECT_EQ(parse_distribution(name_of(distribution)), distribution);
   }
   try {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "core/error.h"
 
@@ -141,6 +142,24 @@ std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<con
   }
   std::rotate(known.begin(), known.end() - static_cast<std::ptrdiff_t>(rank), known.end());
   return known;
+}
+
+std::vector<std::vector<std::byte>> all_to_all(Communicator& comm, std::vector<std::vector<std::byte>> parts) {
+  HPR_CHECK(parts.size() == static_cast<std::size_t>(comm.size()));
+  std::vector<std::vector<std::byte>> arrived(parts.size());
+  std::vector<Outgoing> out;
+  std::vector<int> from;
+  for (int rank = 0; rank < comm.size(); ++rank) {
+    if (rank == comm.rank()) continue;
+    out.push_back({rank, parts[static_cast<std::size_t>(rank)]});
+    from.push_back(rank);
+  }
+  comm.exchange(out, from, [&](int rank, std::span<const std::byte> message) {
+    arrived[static_cast<std::size_t>(rank)].assign(message.begin(), message.end());
+  });
+  const auto own = static_cast<std::size_t>(comm.rank());
+  arrived[own] = std::move(parts[own]);
+  return arrived;
 }
 
 std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory) {

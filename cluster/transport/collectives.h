@@ -30,6 +30,10 @@ void barrier(Communicator& comm);
 /// 1997; each part brings its size along.
 [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(Communicator& comm, std::span<const std::byte> bytes);
 
+/// In one round of messages: parts[i] reaches rank i. Returns what each rank had for this one, in order of rank.
+[[nodiscard]] std::vector<std::vector<std::byte>> all_to_all(Communicator& comm,
+                                                             std::vector<std::vector<std::byte>> parts);
+
 /// For each rank, the first rank of the host with which it shares `memory`.
 [[nodiscard]] std::vector<int> hosts_of(Communicator& comm, PeerMemory& memory);
 

@@ -72,10 +72,16 @@ std::vector<Rgb> draw(const LocalRanks& ranks, const Options& options, std::uint
   return pixels;
 }
 
-const std::vector<Options> kDistributions{{{"distribute", "sort-first"}},
-                                          {{"distribute", "sort-last"}},
-                                          {{"distribute", "hybrid"}, {"groups", "2"}},
-                                          {{"distribute", "sort-last"}, {"data", "partitioned"}}};
+/// Every distribution, and rays that travel.
+std::vector<Options> all_distributions() {
+  std::vector<Options> all;
+  for (const Distribution distribution : kDistributions) {
+    all.push_back({{"distribute", std::string(name_of(distribution))}});
+    if (distribution == Distribution::Hybrid) all.back().emplace_back("groups", "2");
+  }
+  all.push_back({{"distribute", "sort-last"}, {"data", "partitioned"}});
+  return all;
+}
 
 TEST(LoadBalance, FramesHaveTheSameBitsHoweverTheyAreBalanced) {
   const Options few{{"photons", "500"}};
@@ -83,7 +89,7 @@ TEST(LoadBalance, FramesHaveTheSameBitsHoweverTheyAreBalanced) {
   ASSERT_FALSE(expected.empty());
   std::uint64_t lent = 0;
   for (const int ranks : {2, 3, 4, 5, 7, 8}) {
-    for (const Options& distribution : kDistributions) {
+    for (const Options& distribution : all_distributions()) {
       for (const std::string_view balance : kBalanceNames) {
         Options options = few;
         options.insert(options.end(), distribution.begin(), distribution.end());
@@ -224,7 +230,7 @@ TEST(LoadBalance, FramesOfOtherGroupsFollowEachOther) {
   run_local_ranks({.size = 3, .hang_timeout = 60s}, [](Communicator& comm) {
     Session session(comm, {.threads = 1}, [] { return load_scene("gen:cornell"); });
     const View view = make_view(choose_camera({}, session.scene()), {130, 100}, session.scene().bounds);
-    for (const char* distribution : {"sort-first", "hybrid", "sort-last", "hybrid", "sort-first"}) {
+    for (const char* distribution : {"sort-first", "hybrid", "sort-middle", "hybrid", "sort-last", "sort-middle"}) {
       const RenderSettings settings = settings_with({{"distribute", distribution}});
       const FramePlan plan = plan_frame(session, settings.frame, std::span(&view, 1));
       const Frame frame = make_frame(session, plan, std::span(&view, 1));

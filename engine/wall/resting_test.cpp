@@ -65,9 +65,8 @@ TEST(Resting, ASampleOvertakenOnAnyRankIsDroppedOnAllAndDrawnAgainWithTheSameBit
   ASSERT_FALSE(expected.empty());
   EXPECT_TRUE(refine(1, {}, 0) == expected);
   const std::vector<std::vector<std::pair<std::string, std::string>>> distributions{
-      {{"distribute", "sort-first"}},
-      {{"distribute", "sort-last"}},
-      {{"distribute", "hybrid"}, {"groups", "2"}},
+      {{"distribute", "sort-first"}}, {{"distribute", "sort-middle"}, {"primary", "raster"}},
+      {{"distribute", "sort-last"}},  {{"distribute", "hybrid"}, {"groups", "2"}},
       {{"data", "partitioned"}},
   };
   for (const auto& options : distributions) {

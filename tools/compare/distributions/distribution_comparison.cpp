@@ -250,7 +250,7 @@ std::vector<std::string> distributions_in(const std::string& list, const Distrib
       log::debug("{} is left out: {}", name, error.what());
     }
   };
-  for (const Distribution distribution : all_distributions()) add_unless_excluded(std::string(name_of(distribution)));
+  for (const Distribution distribution : kDistributions) add_unless_excluded(std::string(name_of(distribution)));
   add_unless_excluded(kAutoDistribution);
   if (names.empty()) throw Error(*excluded);
   return names;

@@ -10,7 +10,7 @@
 
 namespace hpr {
 
-/// The distributions that a list names, each once: names of all_distributions(), kAutoDistribution, or "all" of them
+/// The distributions that a list names, each once: names of kDistributions, kAutoDistribution, or "all" of them
 /// that the input's settings do not exclude. Throws Error (Usage) for unknown names, with the choices and the nearest
 /// one, and where settings exclude one that is named, or all.
 [[nodiscard]] std::vector<std::string> distributions_in(const std::string& list, const DistributionInput& input);

@@ -18,7 +18,7 @@
 /// What `hpr compare --distribute` measures: whole frames of one distribution on one number of ranks.
 namespace hpr {
 
-/// The name that leaves the choice of a distribution to the plan, beside those of all_distributions().
+/// The name that leaves the choice of a distribution to the plan, beside those of kDistributions.
 inline constexpr const char* kAutoDistribution = "auto";
 /// In place of a strategy's name where no layers are composited.
 inline constexpr const char* kNoStrategy = "none";

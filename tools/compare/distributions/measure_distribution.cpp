@@ -67,7 +67,7 @@ class DistributionBench {
     measured.stages = {.draw_ms = times.primary_ms,
                        .composite_ms = times.composite_ms,
                        .light_ms = times.light_ms,
-                       .exchange_ms = times.exchange_ms + collect_ms,
+                       .exchange_ms = times.chunk_exchange_ms + times.exchange_ms + collect_ms,
                        .collect_ms = collect_ms};
     measured.bytes = comm.bytes_sent() - bytes_before;
     measured.messages = comm.messages_sent() - messages_before;
