@@ -41,7 +41,8 @@ struct Choice {
 /// Throws Error (Usage) where ranks hold parts of the scene and settings ask for more.
 Choice distribution_of_parts(const FrameSettings& settings, const Scene& scene, int ranks) {
   const bool in_islands = static_cast<int>(scene.parts.size()) < ranks;
-  const Distribution fits = in_islands ? Distribution::Hybrid : Distribution::SortLast;
+  const bool in_groups = in_islands || settings.distribution == Distribution::Hybrid;  // of all ranks, it may be
+  const Distribution fits = in_groups ? Distribution::Hybrid : Distribution::SortLast;
   if (settings.distribution.value_or(fits) != fits) {
     throw Error(ExitCode::Usage,
                 fmt::format("ranks hold parts of the scene, which --distribute {} needs whole",

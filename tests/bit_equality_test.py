@@ -114,9 +114,9 @@ def main():
         ranks, threads = ("1", "2", "3", "4", "5", "7", "8") if FULL else ("1", "2", "5", "8"), ("1", "2")
         distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
         strategies, balances = choices_of("--strategy", folder), choices_of("--balance", folder)
-        parts = "sort-last --data partitioned"
-        traced = list(itertools.product(ranks, (*distributions, parts), ("auto",), threads, backends[:1], balances))
-        lit = list(itertools.product(ranks, (*(distributions if FULL else ("sort-first", "sort-last")), parts), ("auto",), threads,
+        parts = ("sort-last --data partitioned", "hybrid --data partitioned")
+        traced = list(itertools.product(ranks, (*distributions, *parts), ("auto",), threads, backends[:1], balances))
+        lit = list(itertools.product(ranks, (*(distributions if FULL else ("sort-first", "sort-last")), *parts), ("auto",), threads,
                                      backends[:1], balances))
         if FULL:
             drawn = [*itertools.product(ranks, distributions, strategies, threads, backends, ("demand",)),
