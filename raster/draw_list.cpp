@@ -98,20 +98,27 @@ void append(Batch& batch, const Run& run) {
   }
 }
 
+/// Whether merged ranges have any surface of [first, last).
+bool meets(const std::vector<SurfaceRange>& ranges, std::uint32_t first, std::uint32_t last) {
+  const auto range =
+      std::ranges::upper_bound(ranges, first, {}, [](const SurfaceRange& candidate) { return candidate.last; });
+  return range != ranges.end() && range->first < last;
+}
+
 void cull_piece(const Geometry& geometry, const Piece& piece, const Culler& culler, const Rect& part, Culling culling,
-                Batch& batch) {
+                const std::vector<SurfaceRange>* only, std::uint32_t first_surface, Batch& batch) {
   const bool cull = culling == Culling::Chunks;
   if (cull && culler.outside(piece.box)) return;
   const bool all = !cull || culler.inside(piece.box);
   if (!cull) batch.pixels = part;
-  if (all && !contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(piece.box));
+  const bool by_chunk = !all || only != nullptr;  // of a piece of which not all is drawn
+  if (!by_chunk && !contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(piece.box));
   for (const Chunk& chunk : std::span(geometry.chunks).subspan(piece.first_chunk, piece.chunks)) {
-    if (!all) {
-      if (culler.outside(chunk.box)) continue;
-      if (!contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(chunk.box));
-    }
     const std::uint32_t first = std::max(chunk.first, piece.first);
     const std::uint32_t last = std::min(chunk.first + chunk.count, piece.last);
+    if (only != nullptr && !meets(*only, first_surface + first, first_surface + last)) continue;
+    if (!all && culler.outside(chunk.box)) continue;
+    if (by_chunk && !contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(chunk.box));
     append(batch, {piece.instance, first, last, chunk.slot + (first - chunk.first)});
     batch.triangles += last - first;
     ++batch.chunks;
@@ -219,12 +226,15 @@ Rect Culler::pixels(const Box& box) const {
           pixel(std::ceil((1.0 - low.y) * half_height + kPixelMargin), part_.y0, part_.y1)};
 }
 
+std::optional<glm::dmat4> drawable_matrix(const Instance& instance, const glm::dmat4& clip_from_eye_relative,
+                                          const glm::dvec3& eye) {
+  const glm::dmat4 matrix = clip_from_mesh(instance, clip_from_eye_relative, eye);
+  return drawable(matrix) ? std::optional(matrix) : std::nullopt;
+}
+
 DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View& view, const Rect& part,
-                        Culling culling, int threads) {
+                        Culling culling, int threads, const std::vector<SurfaceRange>* only) {
   const glm::dmat4 from_eye_relative = clip_from_world(view, view.eye);
-  const auto matrix_of = [&](std::uint32_t instance) {
-    return clip_from_mesh(scene.instances[instance], from_eye_relative, view.eye);
-  };
 
   constexpr std::size_t kBatchPieces = 64;
   std::vector<Batch> batches((geometry.pieces.size() + kBatchPieces - 1) / kBatchPieces);
@@ -232,8 +242,11 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View
     const std::size_t first = index * kBatchPieces;
     const std::size_t count = std::min(kBatchPieces, geometry.pieces.size() - first);
     for (const Piece& piece : std::span(geometry.pieces).subspan(first, count)) {
-      const glm::dmat4 matrix = matrix_of(piece.instance);
-      if (drawable(matrix)) cull_piece(geometry, piece, Culler(matrix, view, part), part, culling, batches[index]);
+      const std::uint32_t first_surface = scene.instances[piece.instance].first_surface;
+      if (only != nullptr && !meets(*only, first_surface + piece.first, first_surface + piece.last)) continue;
+      const auto matrix = drawable_matrix(scene.instances[piece.instance], from_eye_relative, view.eye);
+      if (!matrix) continue;
+      cull_piece(geometry, piece, Culler(*matrix, view, part), part, culling, only, first_surface, batches[index]);
     }
   };
   // Starting threads costs more than a few batches.
@@ -259,8 +272,10 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View
   for (const Run& run : all.runs) {
     const auto record = static_cast<std::uint32_t>(list.records.size());
     list.commands.push_back({(run.last - run.first) * 3, 1, run.slot * 3, 0, record});
-    list.records.push_back({rounded(matrix_of(run.instance)), scene.instances[run.instance].first_surface, {}});
-    append_span(list, winding_of(scene, scene.instances[run.instance]));
+    const Instance& instance = scene.instances[run.instance];
+    list.records.push_back(
+        {rounded(clip_from_mesh(instance, from_eye_relative, view.eye)), instance.first_surface, {}});
+    append_span(list, winding_of(scene, instance));
   }
   return list;
 }

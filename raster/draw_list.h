@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <vector>
 
 #include "raster/geometry.h"
@@ -21,7 +22,7 @@ namespace hpr {
 /// (Blinn and Newell, Clipping Using Homogeneous Coordinates, 1978).
 class Culler {
  public:
-  /// `clip_from_mesh`: as composed in double, before the cast to float. `part`: inside the view, not empty.
+  /// `clip_from_mesh`: as composed in double, before the cast to float. `part`: not empty; it may reach past the view.
   Culler(const glm::dmat4& clip_from_mesh, const View& view, const Rect& part);
 
   /// Nothing in the box can be drawn inside the part.
@@ -91,9 +92,16 @@ enum class Culling {
   None,    ///< everything is sent to GL, for tests and comparisons
 };
 
+/// The matrix of an instance for vertices in mesh coordinates, from that of positions relative to the eye; none where
+/// it overflows a float, and nothing is drawn.
+[[nodiscard]] std::optional<glm::dmat4> drawable_matrix(const Instance& instance,
+                                                        const glm::dmat4& clip_from_eye_relative,
+                                                        const glm::dvec3& eye);
+
 /// Culls the share against `part`, a rectangle inside the view. Instances whose matrix overflows a float are left out,
-/// by the same rule on every rank.
+/// by the same rule on every rank. `only`: merged ranges; of the share, chunks of these surfaces alone are drawn. Null:
+/// all are.
 [[nodiscard]] DrawList make_draw_list(const Scene& scene, const Geometry& geometry, const View& view, const Rect& part,
-                                      Culling culling, int threads);
+                                      Culling culling, int threads, const std::vector<SurfaceRange>* only = nullptr);
 
 }  // namespace hpr

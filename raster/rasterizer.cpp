@@ -119,7 +119,8 @@ class Rasterizer::Implementation {
     std::vector<glm::uvec3>().swap(geometry_.triangles);
   }
 
-  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
+  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer,
+            const std::vector<SurfaceRange>* only) {
     const Size size = view.size();
     HPR_CHECK(size.width <= kRasterLimit && size.height <= kRasterLimit);
     HPR_CHECK(screen < layer.layout().screens() && layer.layout().size(screen) == size);
@@ -132,7 +133,7 @@ class Rasterizer::Implementation {
     }
     for (const Rect& wanted : parts) {
       const Rect part = intersection(wanted, {0, 0, size.width, size.height});
-      if (!part.empty()) draw_part(view, screen, part, layer);
+      if (!part.empty()) draw_part(view, screen, part, layer, only);
     }
     check_gl(context_.gl(), "drawing");
   }
@@ -195,13 +196,14 @@ class Rasterizer::Implementation {
                                  static_cast<GLsizei>(span.count), sizeof(DrawCommand));
   }
 
-  void draw_part(const View& view, std::size_t screen, const Rect& part, TileLayer<Key>& layer) {
+  void draw_part(const View& view, std::size_t screen, const Rect& part, TileLayer<Key>& layer,
+                 const std::vector<SurfaceRange>* only) {
     Stopwatch watch;
     const auto lap = [&watch](double& ms) {
       ms += watch.ms();
       watch.restart();
     };
-    const DrawList list = make_draw_list(scene_, geometry_, view, part, culling_, threads_);
+    const DrawList list = make_draw_list(scene_, geometry_, view, part, culling_, threads_, only);
     stats_.triangles_drawn += list.triangles_drawn;
     stats_.triangles_culled += list.triangles_culled;
     stats_.chunks_drawn += list.chunks_drawn;
@@ -246,8 +248,9 @@ Rasterizer::Rasterizer(GlContext& context, const Scene& scene, std::span<const S
 
 Rasterizer::~Rasterizer() = default;
 
-void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
-  implementation_->draw(view, screen, parts, layer);
+void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer,
+                      const std::vector<SurfaceRange>* only) {
+  implementation_->draw(view, screen, parts, layer, only);
 }
 
 const RasterStats& Rasterizer::stats() const {
