@@ -6,6 +6,7 @@
 
 #include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
+#include "compositing/tile_gather.h"
 #include "core/interrupt.h"
 #include "core/timing.h"
 #include "engine/balance/load_balance.h"
@@ -32,6 +33,11 @@ bool spends_light(const FramePlan& plan) {
   return plan.lit || plan.shading == Shading::Local;
 }
 
+/// Which of its objects this rank draws on a screen; null: all.
+const std::vector<SurfaceRange>* surfaces_of(const FramePlan& plan, std::size_t screen) {
+  return plan.by_view ? &plan.by_view->surfaces(screen) : nullptr;
+}
+
 }  // namespace
 
 void prepare(Session& session, const FramePlan& plan) {
@@ -48,6 +54,7 @@ void prepare(Session& session, const FramePlan& plan) {
 
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                FrameTimes& spent) {
+  HPR_CHECK(!plan.by_view || plan.by_view->fits(views));
   Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
   const trace::Span span("raster");
   std::optional<ScreenChunks> chunks;
@@ -58,7 +65,7 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
     if (chunks) {
       rasterizer.draw(views[screen], screen, parts, (*chunks)[screen], keys);
     } else {
-      rasterizer.draw(views[screen], screen, parts, keys);
+      rasterizer.draw(views[screen], screen, parts, keys, surfaces_of(plan, screen));
     }
     spent.raster += rasterizer.stats();
   }
@@ -104,10 +111,15 @@ FrameTimes draw_keys(Session& session, const FramePlan& plan, std::span<const Ji
   return spent;
 }
 
-/// compositing: merges the group's layers; returns the tiles that this rank owns after it.
+/// compositing: merges the layers of a group, or of the ranks that meet in a tile; returns the tiles that this rank
+/// owns after it.
 std::vector<std::size_t> composite(Session& session, const FramePlan& plan, TileLayer<Key>& keys) {
-  if (plan.mine.group.size() == 1) return plan.tiles;
+  if (plan.mine.group.size() == 1 && !plan.by_view) return plan.tiles;
   const trace::Span span("composite");
+  if (plan.by_view) {
+    const ViewGroups& groups = plan.by_view->groups();
+    return session.tile_gather().composite(session.comm(), keys, groups.tiles, groups.owners);
+  }
   Compositor& compositor = session.compositor(plan.strategy, plan.mine.group);
   return compositor.composite(session.group(plan.mine.group), keys, plan.tiles).tiles;
 }

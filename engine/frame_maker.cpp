@@ -142,7 +142,7 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
     if (samples < min_samples(sampling)) sampling.filter.reset();
   }
   sampler_.reset();  // frees its memory before the next one takes some
-  update_areas(session_, plan_);
+  update_areas(session_, plan_, blocks_.views);
   sampler_ = std::make_unique<FrameSampler>(session_, plan_, sampling, number, keeps_keys_);
   (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only
   times_ = sampler_->times();
@@ -153,7 +153,7 @@ bool FrameMaker::refine(std::span<const View> screens, std::uint64_t number, Int
   if (!refining_) {
     sampler_.reset();
     plan_for({}, screens);
-    update_areas(session_, plan_);
+    update_areas(session_, plan_, blocks_.views);
     sampler_ = std::make_unique<FrameSampler>(session_, plan_, resting_, number, false);
     times_ = {};
   }

@@ -33,7 +33,7 @@ inline constexpr std::array<std::string_view, 3> kPrimaryNames{"raster", "rays",
 struct FrameSettings {
   std::optional<Distribution> distribution;  ///< none: chosen by plan_frame
   Balance balance = Balance::Demand;
-  int groups = 0;        ///< of Hybrid; 0: default_groups
+  int groups = 0;        ///< of Hybrid; 0: by view, else default_groups
   std::string strategy;  ///< empty: chosen by plan_frame
   Primary primary = Primary::Auto;
   DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Raster, which Auto then is

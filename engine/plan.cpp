@@ -71,11 +71,11 @@ Choice choose_distribution(const FrameSettings& settings, const Scene& scene, in
 
 std::string explain_depth(const FramePlan& plan) {
   const char* why = "keys of {} bytes instead of 8 where they are sent, drawn so by OpenGL";
-  if (plan.mine.group.size() == 1) {
+  if (plan.mine.group.size() == 1 && !plan.by_view) {
     why = "as asked; gains nothing, as nothing is composited";
   } else if (plan.strategy == "mpi-reduce") {
     why = "as asked; gains nothing, as MPI's reduction moves whole keys";
-  } else if (plan.strategy == "shared-memory" || plan.strategy == "auto") {
+  } else if (!plan.by_view && (plan.strategy == "shared-memory" || plan.strategy == "auto")) {
     why = "keys of {} bytes instead of 8 between hosts; gains nothing inside one, where they are merged in place";
   }
   return fmt::format("depth: {} bits ({})", kDepthFormatNames.at(static_cast<std::size_t>(plan.depth_format)),
@@ -104,11 +104,25 @@ void check_fits(const std::string& strategy, int ranks) {
               "choose other factors or another strategy, or another number of ranks (--ranks, --groups)");
 }
 
+/// Whether groups of the ranks follow the view. Strategies composite groups whose tiles are cut beforehand; so whoever
+/// names one, or says how many groups there are to be, gets those. Rays find a surface among many as fast as among few,
+/// and would need an Embree scene anew for other objects.
+bool groups_follow_view(const FramePlan& plan, const FrameSettings& settings, const Scene& scene, int ranks) {
+  return plan.distribution == Distribution::Hybrid && ranks > 1 && settings.groups == 0 && settings.strategy.empty() &&
+         plan.primary == Primary::Raster && !settings.partitioned && scene.parts.empty();
+}
+
 /// Who draws what, and how it comes together.
 void explain_distribution(FramePlan& plan, const FrameSettings& settings, const Choice& choice, int ranks) {
   auto& lines = plan.explained;
   lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
                               ranks == 1 ? "" : "s", choice.why));
+  if (plan.by_view) {
+    lines.push_back(fmt::format("groups: by view ({})", describe(*plan.by_view)));
+    lines.emplace_back("composite: each tile among the ranks that draw into it (they are known beforehand)");
+    if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
+    return;
+  }
   const char* const why =
       settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
   lines.push_back(plan.mine.group.size() > 1
@@ -419,7 +433,11 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   }
   plan.verify_percent = settings.verify_percent;
   plan.balance = settings.balance;
-  std::vector<Assignment> assigned = assign(plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
+  const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
+  plan.primary = primary.primary;
+  const bool by_view = groups_follow_view(plan, settings, session.scene(), ranks);
+  std::vector<Assignment> assigned =
+      assign(by_view ? Distribution::SortFirst : plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
   if (plan.rays.show == Show::Rank) plan.drawn_by.emplace(assigned, plan.layout);
   for (std::size_t rank = 0; rank < assigned.size(); ++rank) {
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
@@ -435,6 +453,10 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
                                       covering_surfaces(session.scene(), false));
   }
   plan.tiles = tiles_of(plan.layout, plan.mine.area);
+  if (by_view) {
+    plan.areas.clear();
+    group_by_view(session, plan, views);
+  }
 
   if (!settings.strategy.empty()) {
     agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });
@@ -442,8 +464,6 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
 
   explain_distribution(plan, settings, choice, ranks);
   if (ranks > 1) plan.explained.push_back(explain_balance(plan));
-  const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
-  plan.primary = primary.primary;
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", primary.why));
   if (plan.distribution == Distribution::SortMiddle) plan.explained.push_back(explain_binning(plan, ranks));

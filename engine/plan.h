@@ -10,6 +10,7 @@
 #include "cluster/distribution/assignment.h"
 #include "cluster/distribution/balance.h"
 #include "engine/aov.h"
+#include "engine/balance/view_grouping.h"
 #include "engine/display/drawn_by.h"
 #include "engine/frame_settings.h"
 #include "image/tiles.h"
@@ -36,9 +37,10 @@ struct FramePlan {
   FrameLayout layout;
   Balance balance = Balance::Demand;
   Assignment mine;                             ///< this rank's part
-  std::vector<std::vector<ScreenRect>> areas;  ///< of each group
+  std::vector<std::vector<ScreenRect>> areas;  ///< of each group; none where groups follow the view
+  std::optional<ViewGrouping> by_view;         ///< where groups follow the view: who draws which part of the objects
   std::optional<DrawnBy> drawn_by;             ///< where ranks are shown
-  std::vector<std::size_t> tiles;              ///< of this rank's group, ascending
+  std::vector<std::size_t> tiles;              ///< of this rank's group, or that it draws into, ascending
   std::vector<std::string> explained;          ///< one line per decision, with its reason
 
   /// Whether the picture has an alpha other than 1.

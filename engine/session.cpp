@@ -10,6 +10,7 @@
 #include "cluster/transport/collectives.h"
 #include "compositing/assembly.h"
 #include "compositing/compositor.h"
+#include "compositing/tile_gather.h"
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/log.h"
@@ -17,6 +18,7 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "engine/balance/load_balance.h"
+#include "raster/chunk_bounds.h"
 #include "raster/gl_context.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
@@ -60,6 +62,7 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
       scene_(load_scene_of_all(comm_, load)),
       requirements_(requirements_of(scene_)),
       assembler_(std::make_unique<Assembler>()),
+      tile_gather_(std::make_unique<TileGather>()),
       balance_(std::make_unique<LoadBalance>()) {
   warn_of_scene();
   limit_software_gl(host_.threads);
@@ -140,6 +143,15 @@ void Session::release_scene() {
   rasterizer_.reset();
   whole_rasterizer_.reset();
   objects_.clear();
+  scene_chunks_.reset();
+}
+
+const std::vector<SceneChunk>& Session::scene_chunks() {
+  if (!scene_chunks_) {
+    const trace::Span span("cut chunks");
+    scene_chunks_ = make_scene_chunks(scene_, threads());
+  }
+  return *scene_chunks_;
 }
 
 void Session::compare_rasterizers() {

@@ -25,6 +25,8 @@ class PrimaryRays;
 class Rasterizer;
 class RayScene;
 class RayForwarding;
+class TileGather;
+struct SceneChunk;
 
 /// What a session uses of the machine that each of its ranks runs on.
 struct SessionSettings {
@@ -64,9 +66,13 @@ class Session {
   /// Renderer, version and device of OpenGL, for people.
   [[nodiscard]] std::string gl_description() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }
+  /// What composites where groups follow the view.
+  [[nodiscard]] TileGather& tile_gather() { return *tile_gather_; }
   /// What ranks know of each other's work.
   [[nodiscard]] LoadBalance& balance() { return *balance_; }
 
+  /// The chunks of the scene's surfaces that have keys; made when first asked for, kept until the scene changes.
+  [[nodiscard]] const std::vector<SceneChunk>& scene_chunks();
   /// The rasteriser that holds `objects`; kept until other objects are asked for. After start_gl().
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
@@ -148,7 +154,9 @@ class Session {
   std::string strategy_;
   std::unique_ptr<Compositor> compositor_;
   std::unique_ptr<Assembler> assembler_;
+  std::unique_ptr<TileGather> tile_gather_;
   std::unique_ptr<LoadBalance> balance_;
+  std::optional<std::vector<SceneChunk>> scene_chunks_;
   TileLayer<Key> keys_;
   std::vector<TileLayer<Key>> round_keys_;
   bool keys_shared_ = false;       ///< whether they were meant to be

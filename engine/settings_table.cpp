@@ -461,7 +461,8 @@ std::vector<Setting> make_table() {
        .initial = "auto",
        .decides_bits = false},
       {.name = "groups",
-       .help = "groups of ranks for hybrid (default: about the square root of the ranks)",
+       .help = "groups of ranks for hybrid, whose tiles are cut beforehand (default: groups follow the view; by rays, "
+               "about the square root of the ranks)",
        .value = number(1, 1 << 20, [](Settings& s) -> int& { return s.frame.groups; }),
        .decides_bits = false,
        .used_with = {{"distribute", forms_groups}}},

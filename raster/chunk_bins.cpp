@@ -26,10 +26,10 @@ class Binning {
         from_eye_relative_(clip_from_world(view, view.eye)) {}
 
   void bin(const Piece& piece, Batch& batch) const {
-    const glm::dmat4 matrix = clip_from_mesh(scene_.instances[piece.instance], from_eye_relative_, view_.eye);
-    if (!is_drawable(matrix)) return;
+    const auto matrix = drawable_matrix(scene_.instances[piece.instance], from_eye_relative_, view_.eye);
+    if (!matrix) return;
     const Size size = view_.size();
-    const Culler culler(matrix, view_, {0, 0, size.width, size.height});
+    const Culler culler(*matrix, view_, {0, 0, size.width, size.height});
     if (culler.outside(piece.box)) return;
     const Rect pixels = culler.pixels(piece.box);
     // A piece that one area at most sees needs no look at its chunks: the owner takes one at each before it draws them.

@@ -80,20 +80,27 @@ void append(Batch& batch, const Run& run) {
   }
 }
 
+/// Whether merged ranges have any surface of [first, last).
+bool meets(const std::vector<SurfaceRange>& ranges, std::uint32_t first, std::uint32_t last) {
+  const auto range =
+      std::ranges::upper_bound(ranges, first, {}, [](const SurfaceRange& candidate) { return candidate.last; });
+  return range != ranges.end() && range->first < last;
+}
+
 void cull_piece(const Geometry& geometry, const Piece& piece, const Culler& culler, const Rect& part, Culling culling,
-                Batch& batch) {
+                const std::vector<SurfaceRange>* only, std::uint32_t first_surface, Batch& batch) {
   const bool cull = culling == Culling::Chunks;
   if (cull && culler.outside(piece.box)) return;
   const bool all = !cull || culler.inside(piece.box);
   if (!cull) batch.pixels = part;
-  if (all && !contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(piece.box));
+  const bool by_chunk = !all || only != nullptr;  // of a piece of which not all is drawn
+  if (!by_chunk && !contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(piece.box));
   for (const Chunk& chunk : std::span(geometry.chunks).subspan(piece.first_chunk, piece.chunks)) {
-    if (!all) {
-      if (culler.outside(chunk.box)) continue;
-      if (!contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(chunk.box));
-    }
     const std::uint32_t first = std::max(chunk.first, piece.first);
     const std::uint32_t last = std::min(chunk.first + chunk.count, piece.last);
+    if (only != nullptr && !meets(*only, first_surface + first, first_surface + last)) continue;
+    if (!all && culler.outside(chunk.box)) continue;
+    if (by_chunk && !contains(batch.pixels, part)) batch.pixels = joined(batch.pixels, culler.pixels(chunk.box));
     append(batch, {piece.instance, first, last, chunk.slot + (first - chunk.first)});
     batch.triangles += last - first;
     ++batch.chunks;
@@ -201,13 +208,17 @@ Rect Culler::pixels(const Box& box) const {
           pixel(std::ceil((1.0 - low.y) * half_height + kPixelMargin), part_.y0, part_.y1)};
 }
 
+namespace {
+
+/// The matrix of an instance for vertices in mesh coordinates. Everything is taken relative to the eye in double before
+/// it is rounded, so that a large common offset of scene and eye costs nothing.
 glm::dmat4 clip_from_mesh(const Instance& instance, const glm::dmat4& clip_from_eye_relative, const glm::dvec3& eye) {
   glm::dmat4 to_eye_relative = instance.to_world;
   to_eye_relative[3] -= glm::dvec4(eye, 0.0);
   return clip_from_eye_relative * to_eye_relative;
 }
 
-bool is_drawable(const glm::dmat4& matrix) {
+bool drawable(const glm::dmat4& matrix) {
   constexpr double kMaxElement = 1e30;  // leaves room for the product with a position
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
@@ -217,12 +228,17 @@ bool is_drawable(const glm::dmat4& matrix) {
   return true;
 }
 
+}  // namespace
+
+std::optional<glm::dmat4> drawable_matrix(const Instance& instance, const glm::dmat4& clip_from_eye_relative,
+                                          const glm::dvec3& eye) {
+  const glm::dmat4 matrix = clip_from_mesh(instance, clip_from_eye_relative, eye);
+  return drawable(matrix) ? std::optional(matrix) : std::nullopt;
+}
+
 DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<const Piece> pieces, const View& view,
-                        const Rect& part, Culling culling, int threads) {
+                        const Rect& part, Culling culling, int threads, const std::vector<SurfaceRange>* only) {
   const glm::dmat4 from_eye_relative = clip_from_world(view, view.eye);
-  const auto matrix_of = [&](std::uint32_t instance) {
-    return clip_from_mesh(scene.instances[instance], from_eye_relative, view.eye);
-  };
 
   constexpr std::size_t kBatchPieces = 64;
   std::vector<Batch> batches((pieces.size() + kBatchPieces - 1) / kBatchPieces);
@@ -230,8 +246,11 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<
     const std::size_t first = index * kBatchPieces;
     const std::size_t count = std::min(kBatchPieces, pieces.size() - first);
     for (const Piece& piece : pieces.subspan(first, count)) {
-      const glm::dmat4 matrix = matrix_of(piece.instance);
-      if (is_drawable(matrix)) cull_piece(geometry, piece, Culler(matrix, view, part), part, culling, batches[index]);
+      const std::uint32_t first_surface = scene.instances[piece.instance].first_surface;
+      if (only != nullptr && !meets(*only, first_surface + piece.first, first_surface + piece.last)) continue;
+      const auto matrix = drawable_matrix(scene.instances[piece.instance], from_eye_relative, view.eye);
+      if (!matrix) continue;
+      cull_piece(geometry, piece, Culler(*matrix, view, part), part, culling, only, first_surface, batches[index]);
     }
   };
   // Starting threads costs more than a few batches.
@@ -257,8 +276,10 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<
   for (const Run& run : all.runs) {
     const auto record = static_cast<std::uint32_t>(list.records.size());
     list.commands.push_back({(run.last - run.first) * 3, 1, run.slot * 3, 0, record});
-    list.records.push_back({rounded(matrix_of(run.instance)), scene.instances[run.instance].first_surface, {}});
-    append_span(list, winding_of(scene, scene.instances[run.instance]));
+    const Instance& instance = scene.instances[run.instance];
+    list.records.push_back(
+        {rounded(clip_from_mesh(instance, from_eye_relative, view.eye)), instance.first_surface, {}});
+    append_span(list, winding_of(scene, instance));
   }
   return list;
 }

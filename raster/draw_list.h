@@ -6,6 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,7 +24,7 @@ namespace hpr {
 /// (Blinn and Newell, Clipping Using Homogeneous Coordinates, 1978).
 class Culler {
  public:
-  /// `clip_from_mesh`: as composed in double, before the cast to float. `part`: inside the view, not empty.
+  /// `clip_from_mesh`: as composed in double, before the cast to float. `part`: not empty; it may reach past the view.
   Culler(const glm::dmat4& clip_from_mesh, const View& view, const Rect& part);
 
   /// Nothing in the box can be drawn inside the part.
@@ -93,17 +94,17 @@ enum class Culling {
   None,    ///< everything is sent to GL, for tests and comparisons
 };
 
-/// The matrix of an instance for vertices in mesh coordinates. Everything is taken relative to the eye in double before
-/// it is rounded, so that a large common offset of scene and eye costs nothing. `clip_from_eye_relative`:
-/// clip_from_world(view, view.eye).
-[[nodiscard]] glm::dmat4 clip_from_mesh(const Instance& instance, const glm::dmat4& clip_from_eye_relative,
-                                        const glm::dvec3& eye);
-/// Whether a matrix, and its product with a position, fits a float: instances are left out where it does not, by the
-/// same rule on every rank.
-[[nodiscard]] bool is_drawable(const glm::dmat4& clip_from_mesh);
+/// The matrix of an instance for vertices in mesh coordinates, from that of positions relative to the eye; none where
+/// it overflows a float, and nothing is drawn.
+[[nodiscard]] std::optional<glm::dmat4> drawable_matrix(const Instance& instance,
+                                                        const glm::dmat4& clip_from_eye_relative,
+                                                        const glm::dvec3& eye);
 
-/// Culls `pieces` of the geometry against `part`, a rectangle inside the view.
+/// Culls `pieces` of the geometry against `part`, a rectangle inside the view. Instances whose matrix overflows a float
+/// are left out, by the same rule on every rank. `only`: merged ranges; of the pieces, chunks of these surfaces alone
+/// are drawn. Null: all are.
 [[nodiscard]] DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<const Piece> pieces,
-                                      const View& view, const Rect& part, Culling culling, int threads);
+                                      const View& view, const Rect& part, Culling culling, int threads,
+                                      const std::vector<SurfaceRange>* only = nullptr);
 
 }  // namespace hpr

@@ -120,7 +120,7 @@ class Rasterizer::Implementation {
   }
 
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, std::span<const Piece> pieces,
-            TileLayer<Key>& layer) {
+            TileLayer<Key>& layer, const std::vector<SurfaceRange>* only = nullptr) {
     const Size size = view.size();
     HPR_CHECK(size.width <= kRasterLimit && size.height <= kRasterLimit);
     HPR_CHECK(screen < layer.layout().screens() && layer.layout().size(screen) == size);
@@ -133,7 +133,7 @@ class Rasterizer::Implementation {
     }
     for (const Rect& wanted : parts) {
       const Rect part = intersection(wanted, {0, 0, size.width, size.height});
-      if (!part.empty()) draw_part(view, screen, part, pieces, layer);
+      if (!part.empty()) draw_part(view, screen, part, pieces, layer, only);
     }
     check_gl(context_.gl(), "drawing");
   }
@@ -203,13 +203,13 @@ class Rasterizer::Implementation {
   }
 
   void draw_part(const View& view, std::size_t screen, const Rect& part, std::span<const Piece> pieces,
-                 TileLayer<Key>& layer) {
+                 TileLayer<Key>& layer, const std::vector<SurfaceRange>* only) {
     Stopwatch watch;
     const auto lap = [&watch](double& ms) {
       ms += watch.ms();
       watch.restart();
     };
-    const DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, culling_, threads_);
+    const DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, culling_, threads_, only);
     stats_.triangles_drawn += list.triangles_drawn;
     stats_.triangles_culled += list.triangles_culled;
     stats_.chunks_drawn += list.chunks_drawn;
@@ -254,8 +254,9 @@ Rasterizer::Rasterizer(GlContext& context, const Scene& scene, std::span<const S
 
 Rasterizer::~Rasterizer() = default;
 
-void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
-  implementation_->draw(view, screen, parts, implementation_->geometry().pieces, layer);
+void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer,
+                      const std::vector<SurfaceRange>* only) {
+  implementation_->draw(view, screen, parts, implementation_->geometry().pieces, layer, only);
 }
 
 void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect> parts,

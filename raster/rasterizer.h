@@ -35,8 +35,10 @@ class Rasterizer {
   /// Merges (maximum) the keys of `parts` of the layer's `screen` into `layer`; tiles become active where something was
   /// drawn. `view` is as large as that screen and at most kRasterLimit pixels a side; parts are in its pixels and may
   /// reach past it. Depths are rounded to the layer's depth_format() before they are compared, so that the triangles'
-  /// dealing changes nothing then either. Throws Error as the constructor does.
-  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
+  /// dealing changes nothing then either. `only`: merged ranges; chunks without any of these surfaces are left out.
+  /// Null: none is. Throws Error as the constructor does.
+  void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer,
+            const std::vector<SurfaceRange>* only = nullptr);
   /// Draws some of the chunks, in ascending order; nothing else is culled.
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, std::span<const ChunkRange> chunks,
             TileLayer<Key>& layer);

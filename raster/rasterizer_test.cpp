@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "raster/chunk_bounds.h"
 #include "raster/gl.h"
 #include "raster/raster_test_scenes.h"
 #include "scene/generators/generators.h"
@@ -378,6 +379,34 @@ TEST_P(RasterizerTest, BlocksOfAScreenAreDrawnAsOneScreensPart) {
     }
   }
   EXPECT_LT(differing, 40U);
+}
+
+TEST_P(RasterizerTest, ChunksOfSomeSurfacesAreDrawnAloneAndTogetherGiveAll) {
+  const Scene scene = mixed_scene();
+  const View view = perspective_view({256, 200});
+  const Image<Key> whole = draw_all(*context_, scene, view);
+  Rasterizer rasterizer(*context_, scene, std::array{SurfaceRange{0, scene.triangles}}, 2);
+  TileLayer<Key> layer(FrameLayout({view.screen}));
+  const std::vector<SceneChunk> chunks = make_scene_chunks(scene, 1);
+  for (std::size_t turn = 0; turn < 3; ++turn) {
+    std::vector<SurfaceRange> some;
+    for (std::size_t i = turn; i < chunks.size(); i += 3) some.push_back(chunks[i].surfaces);
+    const std::vector<SurfaceRange> only = merged_ranges(some, scene.triangles);
+    TileLayer<Key> part(layer.layout());
+    rasterizer.draw(view, 0, std::array{view.block}, part, &only);
+    EXPECT_LE(rasterizer.stats().chunks_drawn, some.size());
+    EXPECT_GT(rasterizer.stats().chunks_drawn, 0U);
+    const Image<Key> image = to_image(part, 0);
+    for (const Key key : image.pixels()) {
+      if (key == kNoKey) continue;
+      const auto has = [&](const SurfaceRange& range) {
+        return key_surface(key) >= range.first && key_surface(key) < range.last;
+      };
+      ASSERT_TRUE(std::ranges::any_of(only, has)) << key_surface(key);
+    }
+    rasterizer.draw(view, 0, std::array{view.block}, layer, &only);
+  }
+  EXPECT_TRUE(to_image(layer, 0) == whole);
 }
 
 TEST_P(RasterizerTest, TheFingerprintIsTheSameEveryTime) {

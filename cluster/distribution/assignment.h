@@ -55,7 +55,8 @@ struct ScreenRect {
 /// Which ranks form which group: contiguous, sizes differing by one at most.
 [[nodiscard]] std::vector<std::vector<int>> make_groups(int ranks, int groups);
 
-/// The number of groups hybrid distribution takes when the user names none: about the square root of the ranks.
+/// The number of groups of tiles that hybrid distribution has where the user names none and they do not follow the
+/// view: about the square root of the ranks.
 [[nodiscard]] int default_groups(int ranks);
 
 /// What one rank does in a frame.

@@ -235,7 +235,26 @@ void plan_areas(Session& session, FramePlan& plan, std::span<const View> views) 
                          known.empty() ? std::span<const double>(estimate) : known));
 }
 
-void update_areas(Session& session, FramePlan& plan) {
+void group_by_view(Session& session, FramePlan& plan, std::span<const View> views) {
+  const std::span<const double> light_costs = session.balance().light_costs(plan.layout);
+  if (plan.by_view) {
+    if (plan.by_view->fits(views)) return;
+    plan.by_view->follow(session, plan.layout, views, {}, light_costs);
+  } else {
+    plan.by_view.emplace(session, plan.layout, views, DrawSpeeds{}, light_costs);
+  }
+  const ViewGroups& groups = plan.by_view->groups();
+  plan.mine.area.clear();
+  for (std::size_t screen = 0; screen < views.size(); ++screen) {
+    const Rect area = drawn_area(groups, plan.layout, plan.by_view->chunks(), session.rank(), screen);
+    if (!area.empty()) plan.mine.area.push_back({screen, area});
+  }
+  plan.tiles = groups.tiles.at(static_cast<std::size_t>(session.rank()));
+  if (plan.drawn_by) plan.drawn_by.emplace(groups, plan.by_view->chunks(), plan.layout);
+}
+
+void update_areas(Session& session, FramePlan& plan, std::span<const View> views) {
+  if (plan.by_view) group_by_view(session, plan, views);
   if (!is_balanced(plan)) return;
   const std::span<const double> costs = session.balance().costs(plan.layout);
   if (costs.empty()) return;

@@ -69,7 +69,10 @@ class LoadBalance {
 /// Collective, for a new plan: cuts the screens by what the tiles of the last frame took, else by rays through some
 /// pixels of each, where there is a scene for rays anyway, else by their number.
 void plan_areas(Session& session, FramePlan& plan, std::span<const View> views);
-/// Cuts the screens for the next frame by what the last one took, if that gains much. The same on all ranks.
-void update_areas(Session& session, FramePlan& plan);
+/// Cuts the screens for the next frame, seen as `views`, by what the last one took, if that gains much; where groups
+/// follow the view, they are made anew or follow. The same on all ranks.
+void update_areas(Session& session, FramePlan& plan, std::span<const View> views);
+/// Has the groups of a plan follow these views from now on. The same on all ranks.
+void group_by_view(Session& session, FramePlan& plan, std::span<const View> views);
 
 }  // namespace hpr

@@ -158,7 +158,7 @@ TEST(LoadBalance, AreasFollowWhatTilesTookAndStayWhereItChangesLittle) {
       session.balance().start_frame(plan.layout);
       session.balance().add_light(plan.layout, mine);
       session.balance().finish_frame(comm, plan.layout, 1);
-      update_areas(session, plan);
+      update_areas(session, plan, std::span(&view, 1));
     };
     for (int number = 0; number < 2; ++number) frame_of(0.0, number);
     EXPECT_LE(load(), 1.1);

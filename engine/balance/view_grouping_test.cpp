@@ -1,0 +1,147 @@
+#include "engine/balance/view_grouping.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <glm/geometric.hpp>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cluster/transport/collectives.h"
+#include "cluster/transport/local_communicator.h"
+#include "compositing/assembly.h"
+#include "core/progress.h"
+#include "engine/frame_maker.h"
+#include "engine/render_settings.h"
+#include "engine/session.h"
+#include "engine/settings_table.h"
+#include "raster/chunk_bounds.h"
+#include "rt/show/show.h"
+#include "scene/load_scene.h"
+
+namespace hpr {
+namespace {
+
+using namespace std::chrono_literals;
+using Options = std::vector<std::pair<std::string, std::string>>;
+
+/// Three screens, each with an eye of its own: one from the scene's camera, one from the midst of what is to be seen,
+/// and one from far. All walk from frame to frame.
+std::vector<View> screens_of(const Scene& scene, int frame) {
+  Camera camera = choose_camera({}, scene);
+  const glm::dvec3 center = 0.5 * (scene.bounds.low + scene.bounds.high);
+  const double extent = glm::length(scene.bounds.high - scene.bounds.low);
+  camera.eye += 0.03 * frame * extent * camera.axes[0];
+  std::vector<View> views{make_view(camera, {200, 140}, scene.bounds)};
+  camera.eye = center + 0.05 * (frame + 1) * extent * camera.axes[2];
+  views.push_back(make_view(camera, {150, 130}, scene.bounds));
+  camera.eye = center + (6.0 - 2.0 * frame) * extent * camera.axes[2];
+  views.push_back(make_view(camera, {90, 70}, scene.bounds));
+  return views;
+}
+
+/// The bits of three frames by some ranks, by OpenGL unless the options say otherwise.
+std::vector<Rgb> draw(int ranks, const std::string& scene, const Options& options, bool expect_groups = true) {
+  std::vector<Rgb> pixels;
+  run_local_ranks({.size = ranks, .hang_timeout = 60s, .disorder = 3}, [&](Communicator& comm) {
+    RenderSettings settings;
+    set_setting(settings, "primary", "raster");
+    set_setting(settings, "passes", "none");
+    for (const auto& [name, value] : options) set_setting(settings, name, value);
+    settings = resolve(settings, 1);
+    Session session(comm, {.threads = 1}, [&] { return load_scene(scene); });
+    FrameMaker maker(session, settings.frame, settings.sampling, screens_of(session.scene(), 0), std::nullopt);
+    EXPECT_EQ(maker.plan().by_view.has_value(), ranks > 1 && expect_groups);
+    for (int number = 0; number < 3; ++number) {
+      Progress progress("none", "sample", 0);
+      Frame* const frame =
+          maker.make(screens_of(session.scene(), number), static_cast<std::uint64_t>(number), progress);
+      ASSERT_NE(frame, nullptr);
+      const std::vector<int> to_root(maker.blocks().views.size(), 0);
+      session.assembler().assemble(comm, frame->radiance, frame->owned, to_root);
+      if (comm.rank() != 0) continue;
+      for (std::size_t screen = 0; screen < to_root.size(); ++screen) {
+        const Image<Rgb> image = to_image(frame->radiance, screen);
+        pixels.insert(pixels.end(), image.pixels().begin(), image.pixels().end());
+      }
+    }
+  });
+  return pixels;
+}
+
+const Options kByView{{"distribute", "hybrid"}};
+
+Options with(Options options, const Options& more) {
+  options.insert(options.end(), more.begin(), more.end());
+  return options;
+}
+
+TEST(ViewGrouping, FramesOfEverySceneHaveTheBitsOfOneRank) {
+  for (const char* const scene : {"gen:gallery?s=1&n=1&k=1", "gen:sphereflake?s=2&n=2", "gen:tetra?s=10",
+                                  "gen:asteroids?count=30&k=2", "gen:cloud?count=500", "gen:cornell"}) {
+    const std::vector<Rgb> expected = draw(1, scene, {});
+    ASSERT_FALSE(expected.empty());
+    const bool is_first = scene == std::string_view("gen:gallery?s=1&n=1&k=1");
+    for (const int ranks : is_first ? std::vector{2, 3, 4, 5, 6, 7, 8} : std::vector{3, 8}) {
+      EXPECT_TRUE(draw(ranks, scene, kByView) == expected) << scene << ranks;
+    }
+  }
+}
+
+TEST(ViewGrouping, SoTheyHaveHoweverTheyAreMade) {
+  const std::string scene = "gen:sphereflake?s=2&n=2";
+  for (const Options& options :
+       {Options{{"spp", "16"}, {"filter", "mitchell"}}, Options{{"spp", "8"}, {"adaptive", "true"}},
+        Options{{"depth-format", "16"}}, Options{{"shading", "local"}}, Options{{"passes", "shadow"}, {"spp", "2"}},
+        Options{{"balance", "static"}}, Options{{"balance", "measured"}}, Options{{"verify", "100"}}}) {
+    const std::vector<Rgb> expected = draw(1, scene, options);
+    for (const int ranks : {2, 7}) {
+      EXPECT_TRUE(draw(ranks, scene, with(kByView, options)) == expected) << options.front().first << ranks;
+    }
+  }
+}
+
+TEST(ViewGrouping, WhoNamesAStrategyOrGroupsGetsGroupsOfTilesCutBeforehand) {
+  const std::string scene = "gen:cornell";
+  const std::vector<Rgb> expected = draw(1, scene, {});
+  for (const Options& options :
+       {Options{{"groups", "2"}}, Options{{"strategy", "binary-swap"}}, Options{{"strategy", "direct-send"}}}) {
+    EXPECT_TRUE(draw(4, scene, with(kByView, options), false) == expected) << options.front().first;
+  }
+  EXPECT_TRUE(draw(4, scene, with(kByView, {{"primary", "rays"}}), false) == draw(1, scene, {{"primary", "rays"}}));
+}
+
+TEST(ViewGrouping, ShownRanksAreThoseWhoDrawASurface) {
+  const std::vector<Rgb> shown = draw(3, "gen:sphereflake?s=2&n=2", with(kByView, {{"show", "rank"}}));
+  for (std::uint32_t rank = 0; rank < 3; ++rank) {
+    EXPECT_GT(std::ranges::count(shown, distinct_color(rank)), 100) << rank;
+  }
+}
+
+TEST(ViewGrouping, NothingIsDrawnOutsideTheTilesThatARankSaysItDrawsInto) {
+  run_local_ranks(4, [](Communicator& comm) {
+    RenderSettings settings;
+    for (const auto& [name, value] : kByView) set_setting(settings, name, value);
+    set_setting(settings, "primary", "raster");
+    settings = resolve(settings, 1);
+    Session session(comm, {.threads = 1}, [] { return load_scene("gen:asteroids?count=60&k=3"); });
+    std::vector<View> views = screens_of(session.scene(), 0);
+    const FramePlan plan = plan_frame(session, settings.frame, views);
+    for (View& view : views) view.jitter = {-kMaxJitter, kMaxJitter};
+    TileLayer<Key> keys(plan.layout);
+    rasterize(session, plan, views, keys);
+    std::vector<bool> expected(plan.layout.tiles(), false);
+    for (const std::size_t tile : plan.by_view->groups().tiles[static_cast<std::size_t>(comm.rank())]) {
+      expected[tile] = true;
+    }
+    for (std::size_t tile = 0; tile < plan.layout.tiles(); ++tile) EXPECT_LE(keys.active(tile), expected[tile]) << tile;
+    EXPECT_GT(std::ranges::count(expected, true), 0);
+  });
+}
+
+}  // namespace
+}  // namespace hpr
