@@ -60,7 +60,7 @@ std::vector<ChunkRange> chunks_in_view(const Scene& scene, const Geometry& geome
   std::vector<ChunkRange> chunks;
   for (const Piece& piece : geometry.pieces) {
     const glm::dmat4 from_eye_relative = clip_from_world(view, view.eye);
-    const Culler culler(clip_from_mesh(scene.instances[piece.instance], from_eye_relative, view.eye), view,
+    const Culler culler(*drawable_matrix(scene.instances[piece.instance], from_eye_relative, view.eye), view,
                         {0, 0, view.size().width, view.size().height});
     for (std::uint32_t i = 0; i < piece.chunks; ++i) {
       const std::uint32_t number = piece.number + i;
