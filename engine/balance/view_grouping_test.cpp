@@ -133,7 +133,8 @@ TEST(ViewGrouping, NothingIsDrawnOutsideTheTilesThatARankSaysItDrawsInto) {
     const FramePlan plan = plan_frame(session, settings.frame, views);
     for (View& view : views) view.jitter = {-kMaxJitter, kMaxJitter};
     TileLayer<Key> keys(plan.layout);
-    rasterize(session, plan, views, keys);
+    FrameTimes spent;
+    rasterize(session, plan, views, keys, spent);
     std::vector<bool> expected(plan.layout.tiles(), false);
     for (const std::size_t tile : plan.by_view->groups().tiles[static_cast<std::size_t>(comm.rank())]) {
       expected[tile] = true;
