@@ -228,7 +228,7 @@ void shade_tiles(Session& session, const FramePlan& plan, std::span<const Shaded
     const Stopwatch watch;
     frame.overtaken = !lending.shade(session.comm(), shader, work);
     spent.light_ms += watch.ms() - lending.return_ms();
-    spent.exchange_ms += lending.return_ms();
+    spent.return_ms += lending.return_ms();
     add_light(session, plan, shader, spent);
     spent.work.lent += lending.lent().size();
     return;
@@ -299,7 +299,8 @@ FrameTimes& FrameTimes::operator+=(const FrameTimes& other) {
   raster += other.raster;
   chunk_exchange_ms += other.chunk_exchange_ms;
   composite_ms += other.composite_ms;
-  exchange_ms += other.exchange_ms;
+  move_ms += other.move_ms;
+  return_ms += other.return_ms;
   light_ms += other.light_ms;
   if (passes.empty()) {
     passes = other.passes;
@@ -355,7 +356,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
     move_to_owners(session, plan, of_frame, frame);
   }
   if (sample.before_shading != nullptr) (*sample.before_shading)();
-  spent.exchange_ms = watch.ms() - spent.composite_ms;
+  spent.move_ms = watch.ms() - spent.composite_ms;
 
   frame.overtaken = layer.overtaken;
   if (!frame.overtaken) shade(session, plan, views, sample, lends, frame, spent);

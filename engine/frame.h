@@ -60,7 +60,8 @@ struct FrameTimes {
   RasterStats raster;              ///< of keys that were drawn
   double chunk_exchange_ms = 0.0;  ///< before they are drawn, waiting included
   double composite_ms = 0.0;
-  double exchange_ms = 0.0;      ///< bringing keys to the owners of their tiles, and light that others lit back
+  double move_ms = 0.0;          ///< bringing keys to the owners of their tiles
+  double return_ms = 0.0;        ///< bringing back light that others lit, once all have done so
   double light_ms = 0.0;         ///< photons and light, until this rank's are done
   std::vector<PassTime> passes;  ///< summed over threads
   RayCounts rays;

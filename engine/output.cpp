@@ -146,7 +146,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
   }
   if (plan.distribution == Distribution::SortMiddle)
     stats.times.push_back({"exchange-chunks", slowest(comm, times.chunk_exchange_ms)});
-  stats.times.push_back({"composite", slowest(comm, times.composite_ms + times.exchange_ms)});
+  stats.times.push_back({"composite", slowest(comm, times.composite_ms + times.move_ms)});
   // The shader adds up what its threads took; a frame waits for them side by side.
   for (const PassTime& pass : times.passes) {
     stats.times.push_back({pass.name, slowest(comm, pass.ms / session.threads()), pass.pass});

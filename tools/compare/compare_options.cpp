@@ -240,6 +240,8 @@ void CompareOptions::check_whole_frames() const {
     throw Error(ExitCode::Usage, "--distribute compares the same frame: --spp until a time makes others",
                 "write e.g. --spp 16");
   }
+  if (settings.frame.rays.show == Show::Rank)
+    refuse("--show rank", "each distribution shows other ranks: use hpr render");
   if (!raw.empty()) check_raw(settings);
 }
 

@@ -119,11 +119,13 @@ ExitCode DistributionComparison::run_in_job() const {
     const std::vector<std::size_t> order = shuffled_rounds(names_.size(), rounds, globals_.seed);
     for (std::size_t i = 0; i < order.size(); ++i) {
       const int frames = frames_of_round(options_.frames, rounds, static_cast<int>(i / names_.size()));
+      const bool reference_was_kept = i > 0;
       const std::vector<int> begun = all_gather_value(comm, reset_peak_memory() ? 1 : 0);
       DistributionRun run =
           measure_distribution(comm, globals_, input_, names_[order[i]], {options_.warmup, frames}, check);
       const bool all_begun = std::ranges::find(begun, 0) == begun.end();
-      run.memory_of = i == 0 || all_begun ? kMemoryOfRank : kMemoryOfJob;
+      // Rank 0 keeps the first frame to compare others with.
+      run.memory_of = all_begun && !reference_was_kept ? kMemoryOfRank : kMemoryOfJob;
       DistributionRun& known = runs[order[i]];
       if (known.ms.empty()) {
         known = std::move(run);

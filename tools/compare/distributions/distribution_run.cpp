@@ -32,22 +32,22 @@ struct FrameSizes {
 }  // namespace
 
 FrameStages stages_of(std::span<const RankFrame> ranks, Shading shading) {
-  std::array members{&FrameStages::draw_ms, &FrameStages::composite_ms, &FrameStages::light_ms,
-                     &FrameStages::exchange_ms, &FrameStages::collect_ms};
-  if (shading == Shading::Local) std::swap(members[1], members[2]);
+  FrameStages stages;
   std::vector<double> done(ranks.size());  // per rank, by the stages so far
   double last = 0.0;
-  FrameStages stages;
-  for (const auto member : members) {
-    for (std::size_t rank = 0; rank < ranks.size(); ++rank) {
-      const FrameStages& own = ranks[rank].stages;
-      const bool is_exchange = member == &FrameStages::exchange_ms;
-      done[rank] += own.*member - (is_exchange ? own.collect_ms : 0.0);
-    }
-    const double end = std::ranges::max(done);
-    stages.*member = end - last;
-    last = end;
-  }
+  const auto lasts = [&](double RankStages::*stage) {
+    for (std::size_t rank = 0; rank < ranks.size(); ++rank) done[rank] += ranks[rank].stages.*stage;
+    const double begin = std::exchange(last, std::ranges::max(done));
+    return last - begin;
+  };
+  stages.exchange_ms = lasts(&RankStages::chunks_ms);
+  stages.draw_ms = lasts(&RankStages::draw_ms);
+  if (shading == Shading::Local) stages.light_ms = lasts(&RankStages::light_ms);
+  stages.composite_ms = lasts(&RankStages::composite_ms);
+  stages.exchange_ms += lasts(&RankStages::move_ms);
+  if (shading == Shading::Deferred) stages.light_ms = lasts(&RankStages::light_ms);
+  stages.exchange_ms += lasts(&RankStages::return_ms);
+  stages.collect_ms = lasts(&RankStages::collect_ms);
   stages.exchange_ms += stages.collect_ms;
   return stages;
 }
@@ -88,6 +88,7 @@ void DistributionRun::append(const DistributionRun& more) {
   for (std::size_t rank = 0; rank < memory_peak_bytes.size(); ++rank) {
     memory_peak_bytes[rank] = std::max(memory_peak_bytes[rank], more.memory_peak_bytes.at(rank));
   }
+  if (memory_of == kMemoryOfRank) memory_of = more.memory_of;  // what is said of the peaks holds for all of them
   differing_pixels = std::max(differing_pixels, more.differing_pixels);
   if (!predicted_ms) predicted_ms = more.predicted_ms;
 }

@@ -28,19 +28,30 @@ inline constexpr const char* kMemoryOfRank = "rank";        ///< a process that 
 inline constexpr const char* kMemoryOfProcess = "process";  ///< whose threads are all of the ranks
 inline constexpr const char* kMemoryOfJob = "job";          ///< a process that drew other distributions before
 
+/// What one rank spent on a frame, with its waiting for others.
+struct RankStages {
+  double chunks_ms = 0.0;     ///< finding out what to draw
+  double draw_ms = 0.0;       ///< keys
+  double composite_ms = 0.0;  ///< merging layers of keys
+  double move_ms = 0.0;       ///< keys to the owners of tiles
+  double light_ms = 0.0;      ///< photons, and surfaces with their light
+  double return_ms = 0.0;     ///< lent light back
+  double collect_ms = 0.0;    ///< tiles to screens
+};
+
 /// The time of a frame by what it was spent on.
 struct FrameStages {
   double draw_ms = 0.0;       ///< keys
   double composite_ms = 0.0;  ///< merging layers of keys
   double light_ms = 0.0;      ///< photons, and surfaces with their light
-  double exchange_ms = 0.0;   ///< all else that moves: keys to the owners of tiles, lent light back, tiles to screens
+  double exchange_ms = 0.0;   ///< all else that moves
   double collect_ms = 0.0;    ///< the part of exchange_ms that brings tiles to screens
 };
 
 /// What one rank measured in one frame.
 struct RankFrame {
   double ms = 0.0;  ///< from the frame's first triangle to the last tile on a screen of this rank's
-  FrameStages stages;
+  RankStages stages;
   double work_ms = 0.0;  ///< what it computed itself on all of its threads, without waiting
   std::uint64_t bytes = 0;
   std::uint64_t messages = 0;
@@ -48,8 +59,10 @@ struct RankFrame {
 
 /// A frame's stages as all ranks together passed them: each lasts from when the last rank was done with the stages
 /// before it to when the last rank was done with it. So waiting counts as what was waited for, and the stages add up to
-/// no more than the frame. `shading`: whether light comes before or after compositing.
-[[nodiscard]] FrameStages stages_of(std::span<const RankFrame> ranks, Shading shading = Shading::Deferred);
+/// no more than the frame. Where a frame has several samples, in each of which ranks meet, times are sums over samples,
+/// and what one rank waits for in one sample and another in the next counts as the stage they wait in. `shading`:
+/// whether light comes before or after compositing.
+[[nodiscard]] FrameStages stages_of(std::span<const RankFrame> ranks, Shading shading);
 
 /// Frames of one distribution on one number of ranks; lists have one entry a frame, but for the one of ranks.
 struct DistributionRun {

@@ -16,7 +16,11 @@ namespace {
 
 RankFrame frame_of(double draw, double composite, double light, double exchange, double collect) {
   return {.ms = draw + composite + light + exchange + 1.0,
-          .stages = {draw, composite, light, exchange, collect},
+          .stages = {.draw_ms = draw,
+                     .composite_ms = composite,
+                     .light_ms = light,
+                     .return_ms = exchange - collect,
+                     .collect_ms = collect},
           .work_ms = draw,
           .bytes = static_cast<std::uint64_t>(10.0 * draw),
           .messages = 1};
@@ -24,7 +28,7 @@ RankFrame frame_of(double draw, double composite, double light, double exchange,
 
 TEST(StagesOf, OneRankHasItsOwn) {
   const RankFrame alone = frame_of(1, 2, 3, 5, 4);
-  const FrameStages stages = stages_of(std::span(&alone, 1));
+  const FrameStages stages = stages_of(std::span(&alone, 1), Shading::Deferred);
   EXPECT_EQ(stages.draw_ms, 1.0);
   EXPECT_EQ(stages.composite_ms, 2.0);
   EXPECT_EQ(stages.light_ms, 3.0);
@@ -35,12 +39,22 @@ TEST(StagesOf, OneRankHasItsOwn) {
 TEST(StagesOf, WaitingCountsAsWhatWasWaitedFor) {
   // The first rank waits for the keys of the second while it composites, and the second for the light of the first.
   const std::vector<RankFrame> ranks{frame_of(10, 21, 50, 2, 1), frame_of(30, 1, 5, 47, 1)};
-  const FrameStages stages = stages_of(ranks);
+  const FrameStages stages = stages_of(ranks, Shading::Deferred);
   EXPECT_EQ(stages.draw_ms, 30.0);
   EXPECT_EQ(stages.composite_ms, 1.0);
   EXPECT_EQ(stages.light_ms, 50.0);
   EXPECT_EQ(stages.exchange_ms, 2.0);
   EXPECT_EQ(stages.collect_ms, 1.0);
+}
+
+TEST(StagesOf, WhatIsWaitedForBeforeLightIsNoLight) {
+  // The first rank waits for the keys of the second, which lights little.
+  std::vector<RankFrame> ranks{frame_of(10, 0, 50, 0, 0), frame_of(100, 0, 10, 0, 0)};
+  ranks[0].stages.move_ms = 90.0;
+  const FrameStages stages = stages_of(ranks, Shading::Deferred);
+  EXPECT_EQ(stages.draw_ms, 100.0);
+  EXPECT_EQ(stages.exchange_ms, 0.0);
+  EXPECT_EQ(stages.light_ms, 50.0);
 }
 
 TEST(StagesOf, LayersThatAreLitBeforeTheyAreCompositedAreWaitedForAsLight) {
@@ -49,7 +63,7 @@ TEST(StagesOf, LayersThatAreLitBeforeTheyAreCompositedAreWaitedForAsLight) {
   EXPECT_EQ(stages.draw_ms, 1.0);
   EXPECT_EQ(stages.light_ms, 88.0);
   EXPECT_EQ(stages.composite_ms, 2.0);
-  EXPECT_EQ(stages_of(ranks).composite_ms, 80.0);
+  EXPECT_EQ(stages_of(ranks, Shading::Deferred).composite_ms, 80.0);
 }
 
 TEST(DistributionRun, AddsRanksUpFrameByFrame) {

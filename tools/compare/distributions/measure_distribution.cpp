@@ -64,10 +64,12 @@ class DistributionBench {
     const double collect_ms = collecting.ms();
     const FrameTimes& times = maker_.times();
     RankFrame measured{.ms = watch.ms(), .stages = {}, .work_ms = times.work.keys_ms + times.work.light_ms};
-    measured.stages = {.draw_ms = times.primary_ms,
+    measured.stages = {.chunks_ms = times.chunk_exchange_ms,
+                       .draw_ms = times.primary_ms,
                        .composite_ms = times.composite_ms,
+                       .move_ms = times.move_ms,
                        .light_ms = times.light_ms,
-                       .exchange_ms = times.chunk_exchange_ms + times.exchange_ms + collect_ms,
+                       .return_ms = times.return_ms,
                        .collect_ms = collect_ms};
     measured.bytes = comm.bytes_sent() - bytes_before;
     measured.messages = comm.messages_sent() - messages_before;
