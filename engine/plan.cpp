@@ -303,6 +303,9 @@ constexpr double kFrames = 8.0;
 PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
                                std::span<const View> views) {
   if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
+  if (plan.rays.part && plan.distribution == Distribution::SortMiddle) {
+    return {Primary::Raster, "by who is sent the triangles"};
+  }
   KeyWork work{.triangles = session.scene().triangles, .single_picture = settings.single_picture};
   for (const Mesh& mesh : session.scene().meshes) work.own_triangles += mesh.triangles.size();
   for (const View& view : views) work.pixels += view.size().area();
@@ -404,7 +407,12 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
   }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
-  if (settings.partitioned && ranks > 1) plan.rays.part = plan.mine.objects;
+  if (settings.partitioned && ranks > 1) {
+    if (plan.distribution == Distribution::SortMiddle) {
+      plan.mine.objects = partition_objects(session.scene(), ranks)[static_cast<std::size_t>(session.comm().rank())];
+    }
+    plan.rays.part = plan.mine.objects;
+  }
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),

@@ -177,10 +177,16 @@ void check_combination(const RenderSettings& settings) {
     refuse("--depth-format rounds depths before OpenGL compares them; rays compare their own",
            "use it with --primary raster");
   }
-  if (frame.partitioned && frame.distribution.value_or(Distribution::SortLast) != Distribution::SortLast) {
+  const Distribution distribution = frame.distribution.value_or(Distribution::SortLast);
+  if (frame.partitioned && distribution != Distribution::SortLast && distribution != Distribution::SortMiddle) {
     refuse(fmt::format("--data partitioned gives each rank its own objects, of which --distribute {} draws others",
-                       name_of(*frame.distribution)),
-           "use --distribute sort-last, or leave it out");
+                       name_of(distribution)),
+           "use --distribute sort-last or sort-middle, or leave it out");
+  }
+  if (frame.partitioned && distribution == Distribution::SortMiddle && frame.primary == Primary::Rays) {
+    refuse(
+        "--data partitioned --distribute sort-middle sends triangles for OpenGL to draw, and --primary rays meets none",
+        "use --primary raster, or --distribute sort-last");
   }
   const bool splits = std::ranges::any_of(
       frame.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
