@@ -299,6 +299,15 @@ constexpr double kStartCost = 52e6;      ///< of OpenGL, with its first shaders
 /// What is done once is shared out among so many frames, unless it is known to be for one.
 constexpr double kFrames = 8.0;
 
+/// Leaves this rank its part of the scene's objects: those it draws, or under sort-middle, where it draws what others
+/// send as well, those it culls.
+void partition(const Session& session, FramePlan& plan) {
+  if (plan.distribution == Distribution::SortMiddle) {
+    plan.mine.objects = partition_objects(session.scene(), session.ranks())[static_cast<std::size_t>(session.rank())];
+  }
+  plan.rays.part = plan.mine.objects;
+}
+
 /// Collective where the choice is left open: who makes the keys, and why.
 PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
                                std::span<const View> views) {
@@ -407,12 +416,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
   }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
-  if (settings.partitioned && ranks > 1) {
-    if (plan.distribution == Distribution::SortMiddle) {
-      plan.mine.objects = partition_objects(session.scene(), ranks)[static_cast<std::size_t>(session.comm().rank())];
-    }
-    plan.rays.part = plan.mine.objects;
-  }
+  if (settings.partitioned && ranks > 1) partition(session, plan);
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),
