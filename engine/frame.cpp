@@ -55,10 +55,12 @@ void prepare(Session& session, const FramePlan& plan) {
 void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
                FrameTimes& spent) {
   HPR_CHECK(!plan.by_view || plan.by_view->fits(views));
-  Rasterizer& rasterizer = session.rasterizer(plan.mine.objects);
+  Rasterizer& own = session.rasterizer(plan.mine.objects);
   const trace::Span span("raster");
+  const bool bins = bins_chunks(session, plan);
+  Rasterizer& rasterizer = bins && plan.rays.part ? receive_triangles(session, plan, own, views, spent) : own;
   std::optional<ScreenChunks> chunks;
-  if (bins_chunks(session, plan)) chunks = find_chunks(session, plan, rasterizer, views, spent);
+  if (bins && !plan.rays.part) chunks = find_chunks(session, plan, own, views, spent);
   for (std::size_t screen = 0; screen < views.size(); ++screen) {
     const std::vector<Rect> parts = parts_of(plan.mine.area, screen);
     if (parts.empty()) continue;
@@ -373,7 +375,7 @@ Frame make_frame(Session& session, const FramePlan& plan, std::span<const View> 
 
 std::size_t max_round_size(Session& session, const FramePlan& plan) {
   if (session.comm().size() > 1 && !draws_alone(plan.distribution)) return 1;
-  if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty()) return 1;
+  if (plan.shading != Shading::Deferred || !plan.lit || !plan.aovs.empty() || plan.rays.part) return 1;
   if (session.shader(plan.rays).shades_one_by_one()) return 1;
   // Keys and colours of a round are in memory together.
   constexpr std::size_t kPixels = std::size_t{1} << 23U;

@@ -41,6 +41,7 @@ struct Choice {
 /// Throws Error (Usage) where ranks hold parts of the scene and settings ask for more.
 Choice distribution_of_parts(const FrameSettings& settings, const Scene& scene, int ranks) {
   const bool in_islands = static_cast<int>(scene.parts.size()) < ranks;
+  if (!in_islands && settings.distribution == Distribution::SortMiddle) return {Distribution::SortMiddle, "as asked"};
   const bool in_groups = in_islands || settings.distribution == Distribution::Hybrid;  // of all ranks, it may be
   const Distribution fits = in_groups ? Distribution::Hybrid : Distribution::SortLast;
   if (settings.distribution.value_or(fits) != fits) {
@@ -332,6 +333,16 @@ constexpr double kStartCost = 52e6;      ///< of OpenGL, with its first shaders
 /// What is done once is shared out among so many frames, unless it is known to be for one.
 constexpr double kFrames = 8.0;
 
+/// Leaves this rank its part of the scene's objects: those it draws, or under sort-middle, where it draws what others
+/// send as well, those it culls.
+void partition(const Session& session, FramePlan& plan) {
+  if (plan.distribution == Distribution::SortMiddle) {
+    plan.mine.objects = partition_objects(session.scene(), session.ranks())[static_cast<std::size_t>(session.rank())];
+  }
+  plan.rays.part = plan.mine.objects;
+  if (plan.distribution != Distribution::SortMiddle) plan.rays.holders = plan.mine.group;
+}
+
 /// Collective where the choice is left open: who makes the keys, and why.
 PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
                                std::span<const View> views) {
@@ -412,6 +423,19 @@ FrameLayout layout_of(std::span<const View> views) {
   return FrameLayout(std::move(sizes));
 }
 
+namespace {
+
+/// That what makes the keys is left open must not change them: who would not be sent triangles is told.
+void check_can_send_triangles(const FramePlan& plan, bool in_parts) {
+  if (!in_parts || plan.distribution != Distribution::SortMiddle || plan.primary == Primary::Raster) return;
+  throw Error(
+      ExitCode::Usage,
+      "under sort-middle ranks that hold parts send triangles for OpenGL to draw, and rays would make these keys",
+      "use --primary raster, or --distribute sort-last");
+}
+
+}  // namespace
+
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
   const int ranks = session.comm().size();
   FramePlan plan;
@@ -435,6 +459,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.balance = settings.balance;
   const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
   plan.primary = primary.primary;
+  check_can_send_triangles(plan, settings.partitioned || parts > 0);
   const bool by_view = groups_follow_view(plan, settings, session.scene(), ranks);
   std::vector<Assignment> assigned =
       assign(by_view ? Distribution::SortFirst : plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
@@ -443,10 +468,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
   }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
-  if ((settings.partitioned && plan.mine.group.size() > 1) || parts > 0) {
-    plan.rays.part = plan.mine.objects;
-    plan.rays.holders = plan.mine.group;
-  }
+  if ((settings.partitioned && ranks > 1) || parts > 0) partition(session, plan);
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),

@@ -167,8 +167,7 @@ void resolve_show(RenderSettings& settings) {
 
 /// Whether ranks draw no objects but those of a part of the scene that each holds.
 bool may_be_in_parts(const FrameSettings& frame) {
-  return !frame.distribution || *frame.distribution == Distribution::SortLast ||
-         *frame.distribution == Distribution::Hybrid;
+  return frame.distribution != Distribution::SortFirst;
 }
 
 /// What of the settings excludes each other.
@@ -186,7 +185,12 @@ void check_combination(const RenderSettings& settings) {
   if (frame.partitioned && !may_be_in_parts(frame)) {
     refuse(fmt::format("--data partitioned gives each rank its own objects, of which --distribute {} draws others",
                        name_of(*frame.distribution)),
-           "use --distribute sort-last or hybrid, or leave it out");
+           "use --distribute sort-last, sort-middle or hybrid, or leave it out");
+  }
+  if (frame.partitioned && frame.distribution == Distribution::SortMiddle && frame.primary == Primary::Rays) {
+    refuse(
+        "--data partitioned --distribute sort-middle sends triangles for OpenGL to draw, and --primary rays meets none",
+        "use --primary raster, or --distribute sort-last");
   }
   const bool splits = std::ranges::any_of(
       frame.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });

@@ -142,6 +142,7 @@ void Session::release_scene() {
   traced_objects_.clear();
   rasterizer_.reset();
   whole_rasterizer_.reset();
+  receiving_rasterizer_.reset();
   objects_.clear();
   scene_chunks_.reset();
 }
@@ -176,6 +177,14 @@ Rasterizer& Session::rasterizer(std::span<const SurfaceRange> objects) {
     rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, objects_, host_.threads);
   }
   return *rasterizer_;
+}
+
+Rasterizer& Session::receiving_rasterizer() {
+  HPR_CHECK(gl_);
+  if (!receiving_rasterizer_) {
+    receiving_rasterizer_ = std::make_unique<Rasterizer>(*gl_, scene_, std::span<const SurfaceRange>(), host_.threads);
+  }
+  return *receiving_rasterizer_;
 }
 
 void Session::release_rays() {

@@ -75,6 +75,8 @@ class Session {
   [[nodiscard]] const std::vector<SceneChunk>& scene_chunks();
   /// The rasteriser that holds `objects`; kept until other objects are asked for. After start_gl().
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
+  /// One for triangles that other ranks send, of this session's scene; holds none before they are loaded.
+  [[nodiscard]] Rasterizer& receiving_rasterizer();
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
@@ -140,6 +142,7 @@ class Session {
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
   std::unique_ptr<Rasterizer> whole_rasterizer_;
+  std::unique_ptr<Rasterizer> receiving_rasterizer_;
   RayBuild ray_build_;                             ///< of the ray scenes and primary rays below
   std::optional<std::vector<SurfaceRange>> part_;  ///< the part of the scene they hold; see RaySettings::part
   std::unique_ptr<RayForwarding> forwarding_;      ///< where there is a part

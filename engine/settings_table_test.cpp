@@ -216,7 +216,8 @@ TEST(RenderSettings, WhatExcludesEachOtherIsRefused) {
   using Pairs = std::vector<std::pair<const char*, const char*>>;
   for (const Pairs& pairs :
        {Pairs{{"eye", "0,0,0"}}, Pairs{{"at", "0,0,0"}}, Pairs{{"eye", "0,0,0"}, {"at", "1,0,0"}, {"camera", "a"}},
-        Pairs{{"depth-format", "16"}, {"primary", "rays"}}, Pairs{{"data", "partitioned"}, {"distribute", "sort-first"}},
+        Pairs{{"depth-format", "16"}, {"primary", "rays"}},
+        Pairs{{"data", "partitioned"}, {"distribute", "sort-first"}},
         Pairs{{"reference", "true"}, {"shading", "local"}}, Pairs{{"reference", "true"}, {"aov", "normal"}},
         Pairs{{"adaptive", "true"}, {"half-resolution", "shadow"}}, Pairs{{"aov", "depth"}, {"shading", "local"}},
         Pairs{{"aov", "depth"}, {"resolution-scale", "0.5"}},

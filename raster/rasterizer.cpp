@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "core/bytes.h"
 #include "core/error.h"
 #include "core/timing.h"
+#include "raster/chunk_triangles.h"
 #include "raster/geometry.h"
 #include "raster/gl.h"
 #include "raster/key_target.h"
@@ -101,7 +103,6 @@ class Rasterizer::Implementation {
         scene_(scene),
         threads_(threads),
         culling_(culling),
-        geometry_(collect_geometry(scene, objects)),
         program_(make_program_for(context, format_)),
         vertices_(make_buffer(context)),
         indices_(make_buffer(context)),
@@ -109,10 +110,16 @@ class Rasterizer::Implementation {
         commands_(make_buffer(context)),
         vertex_array_(make_vertex_array(context)),
         target_(context) {
+    describe_vertices(context_.gl());
+    load(collect_geometry(scene, objects));
+  }
+
+  void load(Geometry geometry) {
+    geometry_ = std::move(geometry);
+    context_.make_current();
     const GlFunctions& gl = context_.gl();
     upload(gl, vertices_, geometry_.vertices, GL_STATIC_DRAW);
     upload(gl, indices_, geometry_.triangles, GL_STATIC_DRAW);
-    describe_vertices(gl);
     check_gl(gl, "uploading the scene");
     // From here on only boxes are needed of it.
     std::vector<Vertex>().swap(geometry_.vertices);  // assigning {} would keep the memory
@@ -141,6 +148,10 @@ class Rasterizer::Implementation {
   [[nodiscard]] ChunkBins bin(const View& view, const ChunkRange& chunks,
                               std::span<const std::vector<Rect>> areas) const {
     return bin_chunks(scene_, geometry_, chunks, view, areas, threads_);
+  }
+
+  [[nodiscard]] std::vector<std::byte> pack(std::span<const ChunkRange> chunks) const {
+    return pack_triangles(scene_, geometry_, chunks);
   }
 
   [[nodiscard]] const Geometry& geometry() const { return geometry_; }
@@ -264,12 +275,20 @@ void Rasterizer::draw(const View& view, std::size_t screen, std::span<const Rect
   implementation_->draw(view, screen, parts, pieces_of(implementation_->geometry(), chunks), layer);
 }
 
+void Rasterizer::load(Geometry geometry) {
+  implementation_->load(std::move(geometry));
+}
+
 ChunkRange Rasterizer::chunks() const {
   return implementation_->geometry().numbers();
 }
 
 ChunkBins Rasterizer::bin(const View& view, const ChunkRange& chunks, std::span<const std::vector<Rect>> areas) const {
   return implementation_->bin(view, chunks, areas);
+}
+
+std::vector<std::byte> Rasterizer::pack(std::span<const ChunkRange> chunks) const {
+  return implementation_->pack(chunks);
 }
 
 const RasterStats& Rasterizer::stats() const {

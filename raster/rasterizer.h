@@ -43,12 +43,18 @@ class Rasterizer {
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, std::span<const ChunkRange> chunks,
             TileLayer<Key>& layer);
 
+  /// Holds other triangles from here on: what other ranks sent. Throws Error as the constructor does.
+  void load(Geometry geometry);
+
   /// All chunks that it holds.
   [[nodiscard]] ChunkRange chunks() const;
   /// Which of some chunks are to be drawn for which areas of a view: see raster/chunk_bins.h. Takes part in no drawing,
   /// and needs no context.
   [[nodiscard]] ChunkBins bin(const View& view, const ChunkRange& chunks,
                               std::span<const std::vector<Rect>> areas) const;
+
+  /// Some of the chunks as triangles: see raster/chunk_triangles.h.
+  [[nodiscard]] std::vector<std::byte> pack(std::span<const ChunkRange> chunks) const;
 
   [[nodiscard]] const RasterStats& stats() const;
 

@@ -115,14 +115,15 @@ def main():
         distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
         strategies, balances = choices_of("--strategy", folder), choices_of("--balance", folder)
         parts = ("sort-last --data partitioned", "hybrid --data partitioned")
+        triangles = "sort-middle --data partitioned"
         traced = list(itertools.product(ranks, (*distributions, *parts), ("auto",), threads, backends[:1], balances))
         lit = list(itertools.product(ranks, (*(distributions if FULL else ("sort-first", "sort-last")), *parts), ("auto",), threads,
                                      backends[:1], balances))
         if FULL:
             drawn = [*itertools.product(ranks, distributions, strategies, threads, backends, ("demand",)),
-                     *itertools.product(ranks, distributions, ("auto",), threads, backends[:1], balances)]
+                     *itertools.product(ranks, (*distributions, triangles), ("auto",), threads, backends[:1], balances)]
         else:
-            drawn = list(itertools.product(("1", "2", "3", "7"), distributions, strategies, threads, backends, balances))
+            drawn = list(itertools.product(("1", "2", "3", "7"), (*distributions, triangles), strategies, threads, backends, balances))
         runs = dict.fromkeys(WAYS, lit) | {"raster": drawn, "rays": traced}
         bad = sum(differing(way, runs[way] if FULL else covering(runs[way]), folder) for way in WAYS)
     return 1 if bad else 0

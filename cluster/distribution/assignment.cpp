@@ -139,6 +139,7 @@ std::string_view name_of(Distribution distribution) {
 
 std::string distribution_names() {
   std::vector<std::string_view> names;
+  names.reserve(kDistributions.size());
   for (const Distribution distribution : kDistributions) names.push_back(name_of(distribution));
   return fmt::format("{}", fmt::join(names, ", "));
 }

@@ -22,6 +22,12 @@ struct View;
 [[nodiscard]] ScreenChunks find_chunks(Session& session, const FramePlan& plan, const Rasterizer& rasterizer,
                                        std::span<const View> views, FrameTimes& spent);
 
+/// Collective, in one round of messages, where the scene is partitioned. Culls all chunks of `rasterizer`, this rank's
+/// part, and sends the triangles of those that are found to the owners of the areas; returns the rasterizer that holds
+/// those that all found for this rank's area. Valid until the next call.
+[[nodiscard]] Rasterizer& receive_triangles(Session& session, const FramePlan& plan, const Rasterizer& rasterizer,
+                                            std::span<const View> views, FrameTimes& spent);
+
 /// Of sort-middle: who culls what.
 [[nodiscard]] std::string explain_binning(const FramePlan& plan, int ranks);
 

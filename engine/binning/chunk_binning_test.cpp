@@ -88,6 +88,11 @@ Options with(Options options, const std::string& distribution) {
   return options;
 }
 
+Options with_data(Options options) {
+  options.emplace_back("data", "partitioned");
+  return options;
+}
+
 std::uint64_t looked_at(const Drawn& drawn) {
   std::uint64_t chunks = 0;
   for (const RasterStats& raster : drawn.raster) chunks += raster.chunks_drawn + raster.chunks_culled;
@@ -124,6 +129,22 @@ TEST(SortMiddle, DrawsEverySampleAndSettingAsOneRankDoes) {
     const Drawn drawn = draw("gen:gallery?s=1", 3, with(choice, "sort-middle"));
     EXPECT_TRUE(drawn.pixels == expected.pixels) << choice.front().first;
     EXPECT_EQ(drawn.mismatches, 0U);
+  }
+}
+
+TEST(SortMiddle, TrianglesOfAPartitionedSceneGiveTheKeysAndLightOfOneRank) {
+  const std::vector<Options> choices{
+      {{"passes", "shadow"}}, {{"spp", "3"}, {"passes", "none"}}, {{"primary", "auto"}, {"photons", "300"}}};
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const std::string& scene = kScenes[i];
+    Options alone = choices[i];
+    if (alone.front().first == "primary") alone.front().second = "raster";
+    const Drawn expected = draw(scene, 1, alone);
+    for (const int ranks : {2, 3, 8}) {
+      const Drawn drawn = draw(scene, ranks, with(with_data(choices[i]), "sort-middle"));
+      EXPECT_TRUE(drawn.keys == expected.keys) << scene << ' ' << ranks;
+      EXPECT_TRUE(drawn.pixels == expected.pixels) << scene << ' ' << ranks;
+    }
   }
 }
 
