@@ -41,7 +41,9 @@ struct Choice {
 /// Throws Error (Usage) where ranks hold parts of the scene and settings ask for more.
 Choice distribution_of_parts(const FrameSettings& settings, const Scene& scene, int ranks) {
   const bool in_islands = static_cast<int>(scene.parts.size()) < ranks;
-  if (!in_islands && settings.distribution == Distribution::SortMiddle) return {Distribution::SortMiddle, "as asked"};
+  if (!in_islands && settings.distribution == Distribution::SortMiddle && settings.primary == Primary::Raster) {
+    return {Distribution::SortMiddle, "as asked"};
+  }
   const bool in_groups = in_islands || settings.distribution == Distribution::Hybrid;  // of all ranks, it may be
   const Distribution fits = in_groups ? Distribution::Hybrid : Distribution::SortLast;
   if (settings.distribution.value_or(fits) != fits) {
@@ -423,19 +425,6 @@ FrameLayout layout_of(std::span<const View> views) {
   return FrameLayout(std::move(sizes));
 }
 
-namespace {
-
-/// That what makes the keys is left open must not change them: who would not be sent triangles is told.
-void check_can_send_triangles(const FramePlan& plan, bool in_parts) {
-  if (!in_parts || plan.distribution != Distribution::SortMiddle || plan.primary == Primary::Raster) return;
-  throw Error(
-      ExitCode::Usage,
-      "under sort-middle ranks that hold parts send triangles for OpenGL to draw, and rays would make these keys",
-      "use --primary raster, or --distribute sort-last");
-}
-
-}  // namespace
-
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
   const int ranks = session.comm().size();
   FramePlan plan;
@@ -459,7 +448,6 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.balance = settings.balance;
   const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
   plan.primary = primary.primary;
-  check_can_send_triangles(plan, settings.partitioned || parts > 0);
   const bool by_view = groups_follow_view(plan, settings, session.scene(), ranks);
   std::vector<Assignment> assigned =
       assign(by_view ? Distribution::SortFirst : plan.distribution, session.scene(), plan.layout, ranks, plan.groups);

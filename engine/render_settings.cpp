@@ -187,10 +187,9 @@ void check_combination(const RenderSettings& settings) {
                        name_of(*frame.distribution)),
            "use --distribute sort-last, sort-middle or hybrid, or leave it out");
   }
-  if (frame.partitioned && frame.distribution == Distribution::SortMiddle && frame.primary == Primary::Rays) {
-    refuse(
-        "--data partitioned --distribute sort-middle sends triangles for OpenGL to draw, and --primary rays meets none",
-        "use --primary raster, or --distribute sort-last");
+  if (frame.partitioned && frame.distribution == Distribution::SortMiddle && frame.primary != Primary::Raster) {
+    refuse("--data partitioned --distribute sort-middle sends triangles for OpenGL to draw, and rays would meet none",
+           "use --primary raster, or --distribute sort-last");
   }
   const bool splits = std::ranges::any_of(
       frame.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });

@@ -97,7 +97,7 @@ TEST(EditedParts, WhatPartsCannotDrawIsRefused) {
     const RenderSettings settings = settings_with({{"data", "partitioned"}});
     Session session(comm, {.threads = 1},
                     [&] { return load_scene("gen:asteroids?count=5", settings, {}, {}, first_view(settings)); });
-    for (const char* const name : {"sort-first", "sort-middle"}) {
+    for (const char* const name : {"sort-first"}) {
       const RenderSettings other = settings_with({{"distribute", name}});
       try {
         (void)plan_frame(session, other.frame, screens_of(session.scene()));
