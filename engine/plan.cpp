@@ -107,6 +107,18 @@ void check_fits(const std::string& strategy, int ranks) {
               "choose other factors or another strategy, or another number of ranks (--ranks, --groups)");
 }
 
+/// Throws Error (Usage), on all ranks alike, for what ranks cannot do that hold parts.
+void check_parts(const FrameSettings& settings, const FramePlan& plan, const Scene& scene, int ranks) {
+  if (!scene.parts.empty() && settings.verify_percent > 0.0) {
+    throw Error(ExitCode::Usage, "--verify has a tile drawn whole by another rank, and ranks hold parts of the scene",
+                "leave it out, or load the scene with --data replicated");
+  }
+  if (settings.partitioned && plan.distribution == Distribution::Hybrid && ranks % plan.groups != 0) {
+    throw Error(ExitCode::Usage, fmt::format("{} ranks make no {} groups of one size", ranks, plan.groups),
+                "each group holds all of the scene: choose another number of groups or of ranks");
+  }
+}
+
 /// Whether groups of the ranks follow the view. Strategies composite groups whose tiles are cut beforehand; so whoever
 /// names one, or says how many groups there are to be, gets those. Rays find a surface among many as fast as among few,
 /// and would need an Embree scene anew for other objects.
@@ -169,7 +181,7 @@ void explain_light(Session& session, const FrameSettings& settings, FramePlan& p
   if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
   if (plan.rays.part) {
     lines.push_back(fmt::format("data: partitioned ({}: rays travel to the ranks whose objects they may meet)",
-                                settings.partitioned ? "as asked" : "the scene is too large for one rank"));
+                                settings.partitioned ? "as asked" : "ranks hold parts of the scene"));
   } else if (settings.partitioned) {
     lines.emplace_back("data: whole (one rank has all of it)");
   }
@@ -435,6 +447,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   const int parts = static_cast<int>(session.scene().parts.size());
   plan.groups =
       parts > 0 ? ranks / parts : std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
+  check_parts(settings, plan, session.scene(), ranks);
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
   plan.depth_format = settings.depth_format;
   plan.shading = settings.shading;
@@ -456,7 +469,8 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
   }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
-  if ((settings.partitioned && ranks > 1) || parts > 0) partition(session, plan);
+  const bool in_groups = plan.mine.group.size() > 1 || plan.distribution == Distribution::SortMiddle;
+  if ((settings.partitioned && ranks > 1 && in_groups) || parts > 0) partition(session, plan);
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(session.scene(), true).empty()) {
     plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),

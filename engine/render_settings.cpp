@@ -296,10 +296,24 @@ LoadedScene load_as_fits(const std::string& source, const RenderSettings& settin
   try {
     return load_unshaped_scene(source, limits, settings.scene);
   } catch (const Error& error) {
-    if (error.code() != ExitCode::Limit || settings.is_given("data") || !may_be_in_parts(frame)) throw;
+    const bool has_a_choice = !settings.is_given("data") && may_be_in_parts(frame) && frame.verify_percent == 0.0;
+    if (error.code() != ExitCode::Limit || !has_a_choice || source.starts_with("gen:")) throw;
     log::info("{}; reading it in parts, one for each rank", error.what());
     return in_parts();
   }
+}
+
+/// The framing_camera of a scene of which meshes have no triangles here.
+Camera framing_of(const LoadedScene& loaded) {
+  SceneFraming framing(loaded.scene.bounds);
+  for (std::uint32_t mesh = 0; mesh < loaded.scene.meshes.size(); ++mesh) {
+    const Mesh& known = loaded.scene.meshes[mesh];
+    const Mesh read = known.partial ? loaded.whole_mesh(mesh) : Mesh();
+    for (const Instance& instance : loaded.scene.instances) {
+      if (instance.mesh == mesh) framing.add(instance, known.partial ? read : known);
+    }
+  }
+  return framing.camera();
 }
 
 }  // namespace
@@ -308,7 +322,11 @@ LoadedScene load_scene(const std::string& source, const RenderSettings& settings
                        const ImageLimits& pictures, const FirstView& view) {
   LoadedScene loaded = load_as_fits(source, settings, limits);
   Scene& scene = loaded.scene;
-  if (has_points_or_lines(scene)) shape_points_and_lines(scene, settings.widths, view(scene), limits.memory_bytes);
+  if (has_points_or_lines(scene)) {
+    if (loaded.whole_mesh && scene.cameras.empty()) scene.framing = framing_of(loaded);
+    shape_points_and_lines(scene, settings.widths, view(scene), limits.memory_bytes);
+    scene.framing.reset();  // it may be another one now
+  }
   set_environment(settings.environment, pictures, scene);
   if (settings.cull == Cull::None) {
     for (Material& material : scene.materials) material.double_sided = true;

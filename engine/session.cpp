@@ -31,9 +31,14 @@
 namespace hpr {
 namespace {
 
-/// Collective. Finds which instances are refined, where no rank can tell for itself.
-void find_refined(Communicator& comm, Scene& scene) {
+/// Collective. Finds what all of a scene tells that is shared out: which instances are refined, and a camera that sees
+/// all of it.
+void find_whole(Communicator& comm, Scene& scene) {
   if (scene.parts.empty()) return;
+  SceneFraming framing(scene.bounds);
+  for (const Instance& instance : scene.instances) framing.add(instance, scene.mesh_of(instance));
+  for (const SceneFraming::Extremes& of_rank : all_gather_value(comm, framing.extremes())) framing.add(of_rank);
+  scene.framing = framing.camera();
   const std::vector<SurfaceRange>& part = scene.parts.at(static_cast<std::size_t>(comm.rank()) % scene.parts.size());
   std::vector<RefinementCount> mine;  // of one of those who hold the part
   if (static_cast<std::size_t>(comm.rank()) < scene.parts.size()) {
@@ -49,7 +54,7 @@ void find_refined(Communicator& comm, Scene& scene) {
 Scene load_scene_of_all(Communicator& comm, const std::function<LoadedScene()>& load) {
   const trace::Span span("load scene");
   Scene scene = distribute_scene(comm, load);
-  find_refined(comm, scene);
+  find_whole(comm, scene);
   return scene;
 }
 
@@ -125,7 +130,7 @@ void Session::load(const std::function<LoadedScene()>& load) {
 void Session::change_scene(const std::function<void(Scene&)>& change) {
   release_scene();
   change(scene_);
-  find_refined(comm_, scene_);
+  find_whole(comm_, scene_);
   requirements_ = requirements_of(scene_);
 }
 
@@ -205,10 +210,11 @@ void Session::build_rays_by(const RayBuild& build) {
 void Session::partition_rays(const RaySettings& settings) {
   build_rays_by(settings.build);
   Communicator& holders = settings.part && !settings.holders.empty() ? group(settings.holders) : comm_;
-  if (settings.part == part_) return;
+  if (settings.part == part_ && settings.holders == holders_) return;
   release_rays();
   forwarding_.reset();
   part_ = settings.part;
+  holders_ = settings.holders;
   if (part_) forwarding_ = std::make_unique<RayForwarding>(holders, scene_, RaySpace(scene_.bounds), *part_);
 }
 
@@ -282,14 +288,20 @@ DeferredShader& Session::shader(const RaySettings& settings) {
   return *shader_;
 }
 
+void Session::leave_other_group(std::span<const int> members) {
+  if (!group_.comm || std::ranges::equal(members, group_.members)) return;
+  compositor_.reset();  // these may hold on to the old group
+  keys_ = {};
+  release_rays();
+  forwarding_.reset();
+  part_.reset();
+  group_ = {};
+}
+
 Communicator& Session::group(std::span<const int> members) {
+  leave_other_group(members);
   if (static_cast<int>(members.size()) == comm_.size()) return comm_;
-  if (!group_.comm || !std::ranges::equal(members, group_.members)) {
-    compositor_.reset();  // these may hold on to the old group
-    keys_ = {};
-    release_rays();
-    forwarding_.reset();
-    part_.reset();
+  if (!group_.comm) {
     group_.comm = comm_.subset(members);
     group_.members.assign(members.begin(), members.end());
   }
@@ -306,6 +318,7 @@ Compositor& Session::compositor(const std::string& strategy, std::span<const int
 }
 
 TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& strategy, std::span<const int> members) {
+  leave_other_group(members);  // also who is alone now: the others wait for that, where memory was shared
   const bool shared = members.size() > 1 && compositor(strategy, members).merges_in_place();
   bool fits = keys_.layout() == layout && keys_shared_ == shared && std::ranges::equal(members, keys_members_);
   // Other ranks may have new groups where this one's stays: then all take memory, as all agree on whether there is

@@ -109,6 +109,8 @@ class Session {
  private:
   void compare_rasterizers();
   void warn_of_scene() const;
+  /// Ends what was made with a group that has other members.
+  void leave_other_group(std::span<const int> members);
   /// Ends what was made of the scene.
   void release_scene();
   /// Ends what rays meet where it was built in another way.
@@ -145,6 +147,7 @@ class Session {
   std::unique_ptr<Rasterizer> receiving_rasterizer_;
   RayBuild ray_build_;                             ///< of the ray scenes and primary rays below
   std::optional<std::vector<SurfaceRange>> part_;  ///< the part of the scene they hold; see RaySettings::part
+  std::vector<int> holders_;                       ///< see RaySettings::holders
   std::unique_ptr<RayForwarding> forwarding_;      ///< where there is a part
   std::unique_ptr<RayScene> ray_scene_;
   std::vector<SurfaceRange> traced_objects_;

@@ -35,10 +35,16 @@ struct ChosenVertices {
   std::vector<std::uint32_t> numbers;   ///< by the mesh's vertex, of those that are chosen
 };
 
-/// The vertices that some triangles use.
+/// The vertices that some triangles use, and with triangle 0 those that none does.
 ChosenVertices vertices_of(const Mesh& mesh, std::span<const SurfaceRange> ranges) {
   ChosenVertices chosen;
   chosen.numbers.assign(mesh.positions.size(), 0);
+  if (!ranges.empty() && ranges.front().first == 0) {
+    std::ranges::fill(chosen.numbers, 1U);
+    for (const glm::uvec3& triangle : mesh.triangles) {
+      for (int corner = 0; corner < 3; ++corner) chosen.numbers[triangle[corner]] = 0;
+    }
+  }
   for (const SurfaceRange& range : ranges) {
     for (std::uint32_t t = range.first; t < range.last; ++t) {
       for (int corner = 0; corner < 3; ++corner) chosen.numbers[mesh.triangles[t][corner]] = 1;

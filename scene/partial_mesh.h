@@ -45,7 +45,8 @@ inline constexpr std::uint32_t kPartChunk = 512;
 /// What is known of a whole mesh without its arrays: none of its triangles are here.
 [[nodiscard]] Mesh without_triangles(const Mesh& whole);
 
-/// Some triangles of a whole mesh, `ranges` ascending and apart, with the vertices they use in the order these have
+/// Some triangles of a whole mesh, `ranges` ascending and apart, with the vertices they use, and with triangle 0 those
+/// that no triangle of the whole mesh uses, as they count where a camera frames the scene. In the order vertices have
 /// there. `partial` is what is known of all of it.
 [[nodiscard]] Mesh part_of_mesh(const Mesh& whole, std::span<const SurfaceRange> ranges, const PartialMesh& partial);
 

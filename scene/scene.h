@@ -339,7 +339,5 @@ void finish_scene(Scene& scene);
 [[nodiscard]] Scene scene_from_bytes(std::span<const std::byte> bytes);
 void append_bytes(const Mesh& mesh, ByteBuffer& buffer);
 [[nodiscard]] Mesh mesh_from_bytes(std::span<const std::byte> bytes);
-[[nodiscard]] std::vector<std::byte> to_bytes(const Camera& camera);
-[[nodiscard]] Camera camera_from_bytes(std::span<const std::byte> bytes);
 
 }  // namespace hpr

@@ -268,19 +268,6 @@ Mesh mesh_from_bytes(std::span<const std::byte> bytes) {
   return mesh;
 }
 
-std::vector<std::byte> to_bytes(const Camera& camera) {
-  return bytes_of([&](cereal::BinaryOutputArchive& archive) { archive(const_cast<Camera&>(camera)); });
-}
-
-Camera camera_from_bytes(std::span<const std::byte> bytes) {
-  SpanSource source(bytes);
-  std::istream stream(&source);
-  cereal::BinaryInputArchive archive(stream);
-  Camera camera;
-  archive(camera);
-  return camera;
-}
-
 std::vector<std::byte> to_bytes(const Scene& scene) {
   return bytes_of([&](cereal::BinaryOutputArchive& archive) {
     archive(scene.node_names, scene.environment_note, scene.parts, const_cast<Scene&>(scene));

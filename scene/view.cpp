@@ -159,6 +159,12 @@ class Framing {
     below_ = glm::max(below_, slope_ * at.z - beside);
   }
 
+  [[nodiscard]] SceneFraming::Extremes extremes() const { return {above_.x, above_.y, below_.x, below_.y}; }
+  void add(const SceneFraming::Extremes& others) {
+    above_ = glm::max(above_, glm::dvec2(others[0], others[1]));
+    below_ = glm::max(below_, glm::dvec2(others[2], others[3]));
+  }
+
   [[nodiscard]] glm::dvec3 eye() const {
     const glm::dvec2 midpoint = 0.5 * (above_ - below_);
     const glm::dvec2 back = 0.5 / slope_ * (above_ + below_);
@@ -180,8 +186,10 @@ glm::dvec3 side_to_see(const glm::dvec3& extent) {
   return {0.35, 0.25, 1.0};
 }
 
+}  // namespace
+
 /// A camera that is to see some points inside of a box.
-class PointsFraming {
+class SceneFraming::PointsFraming {
  public:
   explicit PointsFraming(const Bounds& bounds)
       : extent_(bounds.high - bounds.low),
@@ -194,6 +202,8 @@ class PointsFraming {
   void add(const glm::dvec3& point) {
     if (is_finite_) framing_.add(point);
   }
+  [[nodiscard]] Extremes extremes() const { return framing_.extremes(); }
+  void add(const Extremes& others) { framing_.add(others); }
 
   [[nodiscard]] Camera camera() const {
     Camera camera = camera_;
@@ -220,29 +230,36 @@ class PointsFraming {
   Framing framing_;
 };
 
-}  // namespace
-
-struct SceneFraming::Impl {
-  PointsFraming framing;
-};
-
-SceneFraming::SceneFraming(const Bounds& bounds) : impl_(std::make_unique<Impl>(PointsFraming(bounds))) {}
+SceneFraming::SceneFraming(const Bounds& bounds) : points_(std::make_unique<PointsFraming>(bounds)) {}
 SceneFraming::~SceneFraming() = default;
 
-void SceneFraming::add(const Instance& instance, const Mesh& whole) {
+void SceneFraming::add(const Instance& instance, const Mesh& mesh) {
   const glm::dmat4x3 to_world(instance.to_world);
-  for (const glm::vec3& position : whole.positions) impl_->framing.add(to_world * glm::dvec4(position, 1.0));
+  for (const glm::vec3& position : mesh.positions) points_->add(to_world * glm::dvec4(position, 1.0));
+}
+
+void SceneFraming::add(const glm::dvec3& point) {
+  points_->add(point);
+}
+
+SceneFraming::Extremes SceneFraming::extremes() const {
+  return points_->extremes();
+}
+
+void SceneFraming::add(const Extremes& others) {
+  points_->add(others);
 }
 
 Camera SceneFraming::camera() const {
-  return impl_->framing.camera();
+  return points_->camera();
 }
 
 Camera framing_camera(const Bounds& bounds) {
-  PointsFraming framing(bounds);
+  SceneFraming framing(bounds);
   for (int corner = 0; corner < 8; ++corner) {
-    framing.add({(corner & 1) != 0 ? bounds.high.x : bounds.low.x, (corner & 2) != 0 ? bounds.high.y : bounds.low.y,
-                 (corner & 4) != 0 ? bounds.high.z : bounds.low.z});
+    framing.add(glm::dvec3{(corner & 1) != 0 ? bounds.high.x : bounds.low.x,
+                           (corner & 2) != 0 ? bounds.high.y : bounds.low.y,
+                           (corner & 4) != 0 ? bounds.high.z : bounds.low.z});
   }
   return framing.camera();
 }

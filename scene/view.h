@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
@@ -93,12 +94,17 @@ class SceneFraming {
   SceneFraming(const SceneFraming&) = delete;
   SceneFraming& operator=(const SceneFraming&) = delete;
 
-  void add(const Instance& instance, const Mesh& whole);
+  void add(const glm::dvec3& point);
+  void add(const Instance& instance, const Mesh& mesh);
+  /// What counts of all that was added, in whatever order, and adds that of another one with the same bounds.
+  using Extremes = std::array<double, 4>;
+  [[nodiscard]] Extremes extremes() const;
+  void add(const Extremes& others);
   [[nodiscard]] Camera camera() const;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  class PointsFraming;
+  std::unique_ptr<PointsFraming> points_;
 };
 
 /// A perspective camera at `eye` that looks at `at`. Throws Error (Usage) when they coincide or `up` is parallel.

@@ -14,7 +14,6 @@
 #include "core/bytes.h"
 #include "core/error.h"
 #include "scene/partial_mesh.h"
-#include "scene/view.h"
 
 namespace hpr {
 namespace {
@@ -40,6 +39,10 @@ Mesh read_whole(const std::function<Mesh(std::uint32_t)>& whole_mesh, const Scen
   Mesh whole = whole_mesh(mesh);
   whole.name = scene.meshes[mesh].name;
   whole.material = scene.meshes[mesh].material;
+  if (content_hash(whole) != scene.meshes[mesh].partial->content) {
+    throw Error(ExitCode::BadInput, fmt::format("{}: mesh {} changed while it was read", scene.name, mesh),
+                "leave the file alone until it is loaded");
+  }
   return whole;
 }
 
@@ -59,11 +62,12 @@ std::uint64_t memory_of_part(const Scene& scene, int parts) {
 /// Into how many parts a scene is cut for so many ranks.
 int parts_for(const LoadedScene& loaded, int ranks) {
   if (loaded.islands > 0) {
-    if (ranks % loaded.islands != 0) {
-      throw Error(ExitCode::Usage, fmt::format("{} ranks make no {} groups of one size", ranks, loaded.islands),
+    const int islands = std::min(loaded.islands, ranks);
+    if (ranks % islands != 0) {
+      throw Error(ExitCode::Usage, fmt::format("{} ranks make no {} groups of one size", ranks, islands),
                   "each group holds all of the scene: choose another number of groups or of ranks");
     }
-    return ranks / loaded.islands;
+    return ranks / islands;
   }
   for (int parts = 2; parts < ranks; ++parts) {
     if (ranks % parts == 0 && memory_of_part(loaded.scene, parts) <= loaded.memory_limit) return parts;
@@ -83,8 +87,9 @@ void check_part(const LoadedScene& loaded, int parts) {
           : fmt::format("use at least {} ranks, or raise --limit-mem",
                         (shared + loaded.memory_limit - held_by_all - 1) / (loaded.memory_limit - held_by_all));
   throw Error(ExitCode::Limit,
-              fmt::format("a part of the scene needs {} bytes if there are {}, more than the limit of {}", needed,
-                          parts, loaded.memory_limit),
+              fmt::format("{} needs {} bytes, more than the limit of {}",
+                          parts == 1 ? "the scene" : fmt::format("each of {} parts of the scene", parts), needed,
+                          loaded.memory_limit),
               hint);
 }
 
@@ -142,13 +147,9 @@ class MeshBatch {
     clear();
   }
 
-  /// Takes a round's meshes into `scene`; returns whether more come.
-  static More receive(Communicator& comm, Scene& scene) {
-    const std::vector<std::byte> message = comm.receive(0);
-    BatchHeader header;
-    HPR_CHECK(message.size() >= sizeof(header));
-    std::memcpy(&header, message.data(), sizeof(header));
-    std::span<const std::byte> rest = std::span(message).subspan(sizeof(header));
+  /// Takes a round's meshes into `scene`. Throws Error (BadInput) for others than were sent.
+  static void unpack(Communicator& comm, std::span<const std::byte> message, const BatchHeader& header, Scene& scene) {
+    std::span<const std::byte> rest = message.subspan(sizeof(header));
     if (header.hash != xxh64(rest)) {
       throw Error(ExitCode::BadInput, fmt::format("rank {} received other meshes than were sent", comm.rank()),
                   "check the network and its memory");
@@ -161,7 +162,6 @@ class MeshBatch {
       scene.meshes.at(mesh.number) = mesh_from_bytes(rest.subspan(sizeof(mesh), mesh.bytes));
       rest = rest.subspan(sizeof(mesh) + mesh.bytes);
     }
-    return header.more;
   }
 
  private:
@@ -177,23 +177,16 @@ class MeshBatch {
   std::size_t waiting_ = 0;
 };
 
-/// On rank 0: reads the meshes of `scene` one by one and sends each rank what it holds. Returns a camera that sees all.
-Camera send_meshes(Communicator& comm, const std::function<Mesh(std::uint32_t)>& whole_mesh, Scene& scene,
-                   MeshBatch& batch) {
+/// On rank 0: reads the meshes of `scene` one by one and sends each rank what it holds.
+void send_meshes(Communicator& comm, const std::function<Mesh(std::uint32_t)>& whole_mesh, Scene& scene,
+                 MeshBatch& batch) {
   const auto ranks = static_cast<std::size_t>(comm.size());
   std::vector<std::vector<std::vector<SurfaceRange>>> wanted;  // by part and mesh
   for (const std::vector<SurfaceRange>& part : scene.parts) wanted.push_back(triangles_of(scene, part));
-  std::vector<std::vector<std::uint32_t>> placed(scene.meshes.size());
-  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) placed[scene.instances[i].mesh].push_back(i);
-  SceneFraming framing(scene.bounds);
   for (std::uint32_t i = 0; i < scene.meshes.size(); ++i) {
     const std::shared_ptr<const PartialMesh> partial = scene.meshes[i].partial;
-    if (placed[i].empty()) continue;
-    const Mesh whole = partial ? read_whole(whole_mesh, scene, i) : Mesh();
-    for (const std::uint32_t instance : placed[i]) {
-      framing.add(scene.instances[instance], partial ? whole : scene.meshes[i]);
-    }
-    if (!partial) continue;
+    if (!partial || std::ranges::all_of(wanted, [&](const auto& of_part) { return of_part[i].empty(); })) continue;
+    const Mesh whole = read_whole(whole_mesh, scene, i);
     for (std::size_t part = 0; part < wanted.size(); ++part) {
       if (wanted[part][i].empty()) continue;
       Mesh mesh = part_of_mesh(whole, wanted[part][i], *partial);
@@ -204,32 +197,26 @@ Camera send_meshes(Communicator& comm, const std::function<Mesh(std::uint32_t)>&
       if (batch.is_full()) batch.send(comm, More::Comes);
     }
   }
-  return framing.camera();
 }
 
 /// On other ranks: takes all rounds, also those after one that failed.
 void receive_meshes(Communicator& comm, Scene& scene, std::optional<Error>& failure) {
-  for (More more = More::Comes; more == More::Comes;) {
-    try {
-      more = MeshBatch::receive(comm, scene);
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::BadInput) throw;
-      failure = error;
-    }
+  BatchHeader header;
+  while (header.more == More::Comes) {
+    const std::vector<std::byte> message = comm.receive(0);
+    HPR_CHECK(message.size() >= sizeof(header));
+    std::memcpy(&header, message.data(), sizeof(header));
+    if (failure) continue;
+    failure = failure_of([&] { MeshBatch::unpack(comm, message, header, scene); });
   }
 }
 
 /// Collective. Brings each rank the triangles of its part.
 void share_out(Communicator& comm, const std::function<Mesh(std::uint32_t)>& whole_mesh, Scene& scene) {
   std::optional<Error> failure;
-  Camera camera;
   if (comm.rank() == 0) {
     MeshBatch batch(comm.size());
-    try {
-      camera = send_meshes(comm, whole_mesh, scene, batch);
-    } catch (const Error& error) {
-      failure = error;
-    }
+    failure = failure_of([&] { send_meshes(comm, whole_mesh, scene, batch); });
     batch.send(comm, failure ? More::Failed : More::Done);
   } else {
     receive_meshes(comm, scene, failure);
@@ -237,7 +224,6 @@ void share_out(Communicator& comm, const std::function<Mesh(std::uint32_t)>& who
   agree_on_failure(comm, [&] {
     if (failure) throw Error(*failure);
   });
-  scene.framing = camera_from_bytes(on_root(comm, [&] { return to_bytes(camera); }));
 }
 
 /// As bytes for all ranks, in parts where that is wanted.

@@ -74,8 +74,9 @@ void throw_if_packed(std::span<const std::byte> bytes) {
   throw AgreedError(code, what, hint, take_text(bytes));
 }
 
-template <typename Work>
-std::optional<Error> failure_of(const Work& work) {
+}  // namespace
+
+std::optional<Error> failure_of(const std::function<void()>& work) {
   try {
     work();
   } catch (const Error& error) {
@@ -87,8 +88,6 @@ std::optional<Error> failure_of(const Work& work) {
   }
   return std::nullopt;
 }
-
-}  // namespace
 
 void broadcast(Communicator& comm, std::vector<std::byte>& bytes, int root) {
   const int size = comm.size();

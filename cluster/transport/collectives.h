@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstring>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -76,6 +77,9 @@ class AgreedError : public Error {
   using Error::Error;
   explicit AgreedError(const Error& error) : Error(error) {}
 };
+
+/// Runs `work`; what it throws, as an Error: Limit where memory ran out, Internal where it is none.
+[[nodiscard]] std::optional<Error> failure_of(const std::function<void()>& work);
 
 /// Runs `work` on rank 0 alone and returns its bytes on every rank; an Error it throws is thrown on every rank
 /// (AgreedError), so that no rank waits for one that gave up.

@@ -335,6 +335,8 @@ RayForwarding::State RayForwarding::run_rounds(const Run& run) {
 void RayForwarding::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) {
   HPR_CHECK(run_ == nullptr);
   Run run(std::max(threads, 1), count, body);
+  constexpr std::size_t kMetTogether = 2048;  // different triangles, by a thread's rays
+  triangles_.set_capacity(static_cast<std::size_t>(run.threads * kThreadsEach) * kMetTogether);
   run_ = &run;
   failed_ = false;
   const std::size_t size = std::min(count, static_cast<std::size_t>(run.threads * kThreadsEach));

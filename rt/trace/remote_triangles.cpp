@@ -58,17 +58,25 @@ std::shared_ptr<const Mesh> mesh_of(const TriangleRecord& record, std::uint32_t 
 }
 
 std::shared_ptr<const Mesh> RemoteTriangles::find(std::uint32_t surface) {
-  Drawer& drawer = drawer_of(surface);
-  const std::lock_guard lock(drawer.mutex);
-  const auto found = drawer.triangles.find(surface);
-  return found == drawer.triangles.end() ? nullptr : found->second;
+  Shard& shard = shard_of(surface);
+  const std::lock_guard lock(shard.mutex);
+  if (const auto found = shard.recent.find(surface); found != shard.recent.end()) return found->second;
+  const auto found = shard.older.find(surface);
+  if (found == shard.older.end()) return nullptr;
+  std::shared_ptr<const Mesh> triangle = found->second;
+  keep(shard, surface, triangle);
+  return triangle;
 }
 
 void RemoteTriangles::add(std::uint32_t surface, std::shared_ptr<const Mesh> triangle) {
-  Drawer& drawer = drawer_of(surface);
-  const std::lock_guard lock(drawer.mutex);
-  if (drawer.triangles.size() >= kPerDrawer) drawer.triangles.clear();
-  drawer.triangles.insert_or_assign(surface, std::move(triangle));
+  Shard& shard = shard_of(surface);
+  const std::lock_guard lock(shard.mutex);
+  keep(shard, surface, std::move(triangle));
+}
+
+void RemoteTriangles::keep(Shard& shard, std::uint32_t surface, std::shared_ptr<const Mesh> triangle) const {
+  if (shard.recent.size() >= per_shard_) shard.older = std::exchange(shard.recent, {});
+  shard.recent.insert_or_assign(surface, std::move(triangle));
 }
 
 SurfaceOwners::SurfaceOwners(std::span<const std::vector<SurfaceRange>> parts) {

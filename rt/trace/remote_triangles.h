@@ -31,20 +31,27 @@ struct TriangleRecord {
 /// Triangles that came from other ranks, as many as fit. Any thread may call it.
 class RemoteTriangles {
  public:
+  /// Keeps from `count` to twice as many, those that were used last; about 0.6 kB each. Before others call it.
+  void set_capacity(std::size_t count) { per_shard_ = count / kShards + 1; }
   /// Null where it is not here, or not any more.
   [[nodiscard]] std::shared_ptr<const Mesh> find(std::uint32_t surface);
   void add(std::uint32_t surface, std::shared_ptr<const Mesh> triangle);
 
  private:
-  static constexpr std::size_t kDrawers = 64;
-  static constexpr std::size_t kPerDrawer = 1024;  ///< about 0.6 MB
-  struct Drawer {
+  static constexpr std::size_t kShards = 64;
+  using Triangles = std::unordered_map<std::uint32_t, std::shared_ptr<const Mesh>>;
+  struct Shard {
     std::mutex mutex;
-    std::unordered_map<std::uint32_t, std::shared_ptr<const Mesh>> triangles;
+    Triangles recent;
+    Triangles older;  ///< which `recent` was before it was full
   };
-  [[nodiscard]] Drawer& drawer_of(std::uint32_t surface) { return drawers_[surface % kDrawers]; }
+  /// By Fibonacci hashing (Knuth, The Art of Computer Programming, volume 3, section 6.4), as neighbors are met
+  /// together.
+  [[nodiscard]] Shard& shard_of(std::uint32_t surface) { return shards_[surface * 2654435769U >> 26U]; }
+  void keep(Shard& shard, std::uint32_t surface, std::shared_ptr<const Mesh> triangle) const;
 
-  std::array<Drawer, kDrawers> drawers_;
+  std::array<Shard, kShards> shards_;
+  std::size_t per_shard_ = 256;
 };
 
 /// Which rank holds a surface that not all hold.

@@ -342,7 +342,7 @@ class SceneBuilder {
   /// A mesh of the scene once more, as it was before its triangles were left out; but for its name and material.
   [[nodiscard]] Mesh whole_mesh(std::uint32_t index) const {
     const Source& source = sources_.at(index);
-    return *build(data_.model().nodes[GltfData::to_size(source.node)], source.primitive);
+    return build(data_.model().nodes[GltfData::to_size(source.node)], source.primitive).value_or(Mesh());
   }
 
  private:

@@ -36,8 +36,11 @@ FrameStages stages_of(std::span<const RankFrame> ranks, Shading shading) {
   std::vector<double> done(ranks.size());  // per rank, by the stages so far
   double last = 0.0;
   const auto lasts = [&](double RankStages::*stage) {
-    for (std::size_t rank = 0; rank < ranks.size(); ++rank) done[rank] += ranks[rank].stages.*stage;
-    const double begin = std::exchange(last, std::ranges::max(done));
+    const double begin = last;
+    for (std::size_t rank = 0; rank < ranks.size(); ++rank) {
+      done[rank] += ranks[rank].stages.*stage;
+      last = std::max(last, done[rank]);
+    }
     return last - begin;
   };
   stages.exchange_ms = lasts(&RankStages::chunks_ms);
