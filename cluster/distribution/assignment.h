@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,6 +20,7 @@ enum class Distribution {
   SortLast,   ///< each rank draws its own objects over the whole frame; keys are composited
   Hybrid,     ///< groups of ranks own tiles (sort-first), ranks of a group share the objects (sort-last)
 };
+inline constexpr std::array kDistributions{Distribution::SortFirst, Distribution::SortLast, Distribution::Hybrid};
 [[nodiscard]] std::string_view name_of(Distribution distribution);
 /// Throws Error (Usage) with the choices and `further` ones that the caller has.
 [[nodiscard]] Distribution parse_distribution(std::string_view name, std::span<const std::string> further = {});
@@ -41,6 +45,14 @@ struct ScreenRect {
 /// Ranges of a share ascend. The same on every rank.
 [[nodiscard]] std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts,
                                                                        std::uint32_t chunk = 512);
+
+/// Neighboring triangles that stay together.
+struct ObjectChunk {
+  SurfaceRange surfaces;
+  glm::dvec3 center{0.0};
+};
+/// Partitions chunks as partition_objects does those of a scene.
+[[nodiscard]] std::vector<std::vector<SurfaceRange>> partition_chunks(std::vector<ObjectChunk> chunks, int parts);
 
 /// Which ranks form which group: contiguous, sizes differing by one at most.
 [[nodiscard]] std::vector<std::vector<int>> make_groups(int ranks, int groups);
