@@ -152,10 +152,10 @@ void Session::release_scene() {
   scene_chunks_.reset();
 }
 
-const std::vector<SceneChunk>& Session::scene_chunks() {
+const SceneChunks& Session::scene_chunks() {
   if (!scene_chunks_) {
     const trace::Span span("cut chunks");
-    scene_chunks_ = make_scene_chunks(scene_, threads());
+    scene_chunks_ = std::make_unique<SceneChunks>(make_scene_chunks(scene_, threads()));
   }
   return *scene_chunks_;
 }

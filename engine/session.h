@@ -26,7 +26,7 @@ class Rasterizer;
 class RayScene;
 class RayForwarding;
 class TileGather;
-struct SceneChunk;
+struct SceneChunks;
 
 /// What a session uses of the machine that each of its ranks runs on.
 struct SessionSettings {
@@ -72,7 +72,7 @@ class Session {
   [[nodiscard]] LoadBalance& balance() { return *balance_; }
 
   /// The chunks of the scene's surfaces that have keys; made when first asked for, kept until the scene changes.
-  [[nodiscard]] const std::vector<SceneChunk>& scene_chunks();
+  [[nodiscard]] const SceneChunks& scene_chunks();
   /// The rasteriser that holds `objects`; kept until other objects are asked for. After start_gl().
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
   /// One for triangles that other ranks send, of this session's scene; holds none before they are loaded.
@@ -162,7 +162,7 @@ class Session {
   std::unique_ptr<Assembler> assembler_;
   std::unique_ptr<TileGather> tile_gather_;
   std::unique_ptr<LoadBalance> balance_;
-  std::optional<std::vector<SceneChunk>> scene_chunks_;
+  std::unique_ptr<SceneChunks> scene_chunks_;
   TileLayer<Key> keys_;
   std::vector<TileLayer<Key>> round_keys_;
   bool keys_shared_ = false;       ///< whether they were meant to be

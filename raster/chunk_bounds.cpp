@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
+#include "core/error.h"
 #include "core/parallel.h"
 #include "raster/draw_list.h"
 
@@ -14,6 +15,7 @@ namespace {
 /// The chunks of a mesh, as if it had an instance of index 0 whose surfaces start with 0.
 std::vector<SceneChunk> chunks_of(const Mesh& mesh) {
   std::vector<SceneChunk> chunks;
+  HPR_CHECK(!mesh.partial);
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
   for (std::uint32_t first = 0; first < count; first += kChunkTriangles) {
     const glm::vec3 start = mesh.positions[mesh.triangles[first].x];
@@ -32,6 +34,20 @@ std::vector<SceneChunk> chunks_of(const Mesh& mesh) {
   return chunks;
 }
 
+/// About where a chunk lies in the world.
+struct Ball {
+  glm::dvec3 center{0.0};
+  double radius = 0.0;
+};
+
+Ball ball_of(const SceneChunk& chunk, const Instance& instance) {
+  const glm::dvec3 low(chunk.box.low);
+  const glm::dvec3 high(chunk.box.high);
+  const glm::dmat3 axes(instance.to_world);
+  const double scale = std::max({glm::length(axes[0]), glm::length(axes[1]), glm::length(axes[2])});
+  return {glm::dvec3(instance.to_world * glm::dvec4(0.5 * (low + high), 1.0)), 0.5 * scale * glm::distance(low, high)};
+}
+
 /// Cauchy: surfaces that face all directions alike show half of their area from any side. The scale is that of the
 /// box's center.
 double covered_pixels(const glm::dmat4& clip_from_mesh, const View& view, const SceneChunk& chunk) {
@@ -47,10 +63,11 @@ double covered_pixels(const glm::dmat4& clip_from_mesh, const View& view, const 
 
 }  // namespace
 
-std::vector<SceneChunk> make_scene_chunks(const Scene& scene, int threads) {
+SceneChunks make_scene_chunks(const Scene& scene, int threads) {
   std::vector<std::vector<SceneChunk>> of_mesh(scene.meshes.size());
   parallel_for(threads, of_mesh.size(), [&](std::size_t mesh) { of_mesh[mesh] = chunks_of(scene.meshes[mesh]); });
-  std::vector<SceneChunk> chunks;
+  SceneChunks made;
+  Ball last;
   for (const InstanceRange& part : split_by_instance(scene, covering_surfaces(scene, false))) {
     const Instance& instance = scene.instances[part.instance];
     for (SceneChunk chunk : of_mesh[instance.mesh]) {
@@ -58,10 +75,22 @@ std::vector<SceneChunk> make_scene_chunks(const Scene& scene, int threads) {
       chunk.instance = part.instance;
       chunk.surfaces.first += instance.first_surface;
       chunk.surfaces.last += instance.first_surface;
-      chunks.push_back(chunk);
+      const Ball ball = ball_of(chunk, instance);
+      auto& clusters = made.clusters;
+      const bool joins = !clusters.empty() && clusters.back().last == chunk.surfaces.first &&
+                         chunk.surfaces.last - clusters.back().first <= kChunkTriangles &&
+                         glm::distance(ball.center, last.center) <= 2.0 * (ball.radius + last.radius);
+      if (joins) {
+        clusters.back().last = chunk.surfaces.last;
+      } else {
+        clusters.push_back(chunk.surfaces);
+        last = ball;  // of a cluster's first chunk
+      }
+      chunk.cluster = static_cast<std::uint32_t>(clusters.size() - 1);
+      made.chunks.push_back(chunk);
     }
   }
-  return chunks;
+  return made;
 }
 
 std::vector<ChunkBounds> bound_chunks(const Scene& scene, std::span<const SceneChunk> chunks, const View& view,

@@ -16,11 +16,18 @@ struct SceneChunk {
   SurfaceRange surfaces;
   Box box;            ///< in mesh coordinates
   float area = 0.0F;  ///< of the triangles together, in mesh coordinates
+  std::uint32_t cluster = 0;
 };
 
-/// The surfaces that have keys, in chunks of at most kChunkTriangles whose borders are those that the rasterizer culls
-/// by. In ascending order of surface id.
-[[nodiscard]] std::vector<SceneChunk> make_scene_chunks(const Scene& scene, int threads);
+/// The surfaces that have keys.
+struct SceneChunks {
+  /// In ascending order of surface id, of at most kChunkTriangles each, with the borders that the rasterizer culls by.
+  std::vector<SceneChunk> chunks;
+  /// Chunks that follow each other and lie near each other, as those of small instances do, with no more triangles
+  /// together than a chunk may have: what is handled as one. Ascending.
+  std::vector<SurfaceRange> clusters;
+};
+[[nodiscard]] SceneChunks make_scene_chunks(const Scene& scene, int threads);
 
 /// What a chunk can touch of a view.
 struct ChunkBounds {

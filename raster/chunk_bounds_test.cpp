@@ -57,7 +57,7 @@ View view_from(std::mt19937& random, bool orthographic) {
 
 TEST(ChunkBounds, PixelsOfEveryPointBeforeTheNearPlaneLieInsideWhateverTheJitter) {
   const Scene scene = scene_of_instances();
-  const std::vector<SceneChunk> chunks = make_scene_chunks(scene, 2);
+  const std::vector<SceneChunk> chunks = make_scene_chunks(scene, 2).chunks;
   std::mt19937 random(1);
   int inside = 0;
   int tight = 0;
@@ -112,12 +112,17 @@ TEST(ChunkBounds, ChunksHoldTheSurfacesThatHaveKeysOnce) {
   scene.materials.back().base_color.a = 0.5F;
   scene.meshes[1].material = 1;
   std::vector<SurfaceRange> ranges;
-  for (const SceneChunk& chunk : make_scene_chunks(scene, 1)) {
+  const SceneChunks made = make_scene_chunks(scene, 1);
+  for (const SceneChunk& chunk : made.chunks) {
+    EXPECT_GE(chunk.surfaces.first, made.clusters.at(chunk.cluster).first);
+    EXPECT_LE(chunk.surfaces.last, made.clusters.at(chunk.cluster).last);
     EXPECT_LE(chunk.surfaces.count(), kChunkTriangles);
     EXPECT_TRUE(ranges.empty() || ranges.back().last <= chunk.surfaces.first);
     ranges.push_back(chunk.surfaces);
   }
   EXPECT_EQ(merged_ranges(ranges, scene.triangles), covering_surfaces(scene, false));
+  EXPECT_EQ(merged_ranges(made.clusters, scene.triangles), covering_surfaces(scene, false));
+  for (const SurfaceRange& cluster : made.clusters) EXPECT_LE(cluster.count(), kChunkTriangles);
 }
 
 }  // namespace

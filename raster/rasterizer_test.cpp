@@ -387,7 +387,7 @@ TEST_P(RasterizerTest, ChunksOfSomeSurfacesAreDrawnAloneAndTogetherGiveAll) {
   const Image<Key> whole = draw_all(*context_, scene, view);
   Rasterizer rasterizer(*context_, scene, std::array{SurfaceRange{0, scene.triangles}}, 2);
   TileLayer<Key> layer(FrameLayout({view.screen}));
-  const std::vector<SceneChunk> chunks = make_scene_chunks(scene, 1);
+  const std::vector<SceneChunk> chunks = make_scene_chunks(scene, 1).chunks;
   for (std::size_t turn = 0; turn < 3; ++turn) {
     std::vector<SurfaceRange> some;
     for (std::size_t i = turn; i < chunks.size(); i += 3) some.push_back(chunks[i].surfaces);

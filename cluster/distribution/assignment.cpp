@@ -47,11 +47,6 @@ void cut_by_count(const ScreenRect& rect, double wanted, std::vector<ScreenRect>
   add_if_any(second, slice(rect, along_x, whole + 1, steps));
 }
 
-struct Chunk {
-  SurfaceRange surfaces;
-  glm::dvec3 center;
-};
-
 /// Of triangles [first, last) of a mesh that may be known by its chunks alone.
 Bounds chunk_bounds(const Mesh& mesh, std::uint32_t first, std::uint32_t last) {
   if (!mesh.partial) return bounds_of(mesh, std::span(mesh.triangles).subspan(first, last - first));
@@ -59,8 +54,8 @@ Bounds chunk_bounds(const Mesh& mesh, std::uint32_t first, std::uint32_t last) {
   return mesh.partial->chunks.at(first / kPartChunk);
 }
 
-std::vector<Chunk> make_chunks(const Scene& scene, std::uint32_t most) {
-  std::vector<Chunk> chunks;
+std::vector<ObjectChunk> make_chunks(const Scene& scene, std::uint32_t most) {
+  std::vector<ObjectChunk> chunks;
   for (const Instance& instance : scene.instances) {
     const Mesh& mesh = scene.mesh_of(instance);
     const std::uint32_t count = mesh.triangle_count();
@@ -75,10 +70,10 @@ std::vector<Chunk> make_chunks(const Scene& scene, std::uint32_t most) {
 }
 
 /// The chunks' surfaces in order of their ids, neighbours joined.
-std::vector<SurfaceRange> joined(std::span<Chunk> chunks) {
-  std::ranges::sort(chunks, {}, [](const Chunk& chunk) { return chunk.surfaces.first; });
+std::vector<SurfaceRange> joined(std::span<ObjectChunk> chunks) {
+  std::ranges::sort(chunks, {}, [](const ObjectChunk& chunk) { return chunk.surfaces.first; });
   std::vector<SurfaceRange> ranges;
-  for (const Chunk& chunk : chunks) {
+  for (const ObjectChunk& chunk : chunks) {
     if (!ranges.empty() && ranges.back().last == chunk.surfaces.first) {
       ranges.back().last = chunk.surfaces.last;
     } else {
@@ -88,11 +83,11 @@ std::vector<SurfaceRange> joined(std::span<Chunk> chunks) {
   return ranges;
 }
 
-int longest_axis(std::span<const Chunk> chunks) {
+int longest_axis(std::span<const ObjectChunk> chunks) {
   if (chunks.empty()) return 0;
   glm::dvec3 low = chunks.front().center;
   glm::dvec3 high = low;
-  for (const Chunk& chunk : chunks) {
+  for (const ObjectChunk& chunk : chunks) {
     low = glm::min(low, chunk.center);
     high = glm::max(high, chunk.center);
   }
@@ -100,18 +95,18 @@ int longest_axis(std::span<const Chunk> chunks) {
   return extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
 }
 
-void partition_recursively(std::span<Chunk> chunks, std::span<std::vector<SurfaceRange>> parts) {
+void partition_recursively(std::span<ObjectChunk> chunks, std::span<std::vector<SurfaceRange>> parts) {
   if (parts.size() == 1) {
     parts[0] = joined(chunks);
     return;
   }
   const int axis = longest_axis(chunks);
-  std::ranges::sort(chunks, [axis](const Chunk& a, const Chunk& b) {
+  std::ranges::sort(chunks, [axis](const ObjectChunk& a, const ObjectChunk& b) {
     return a.center[axis] != b.center[axis] ? a.center[axis] < b.center[axis] : a.surfaces.first < b.surfaces.first;
   });
   const std::size_t half = parts.size() / 2;
   std::uint64_t total = 0;
-  for (const Chunk& chunk : chunks) total += chunk.surfaces.count();
+  for (const ObjectChunk& chunk : chunks) total += chunk.surfaces.count();
   const std::uint64_t wanted = total * half / parts.size();
   std::size_t split = 0;
   for (std::uint64_t sum = 0; split < chunks.size() && sum + chunks[split].surfaces.count() / 2 < wanted; ++split) {
@@ -169,8 +164,11 @@ std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int
     HPR_CHECK(scene.parts.size() == static_cast<std::size_t>(parts));
     return scene.parts;
   }
+  return partition_chunks(make_chunks(scene, chunk), parts);
+}
+
+std::vector<std::vector<SurfaceRange>> partition_chunks(std::vector<ObjectChunk> chunks, int parts) {
   std::vector<std::vector<SurfaceRange>> partition(static_cast<std::size_t>(parts));
-  std::vector<Chunk> chunks = make_chunks(scene, chunk);
   partition_recursively(chunks, partition);
   return partition;
 }

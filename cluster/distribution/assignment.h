@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,6 +53,14 @@ struct ScreenRect {
 /// Ranges of a share ascend. The same on every rank. Of a scene that is shared out, its own parts.
 [[nodiscard]] std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts,
                                                                        std::uint32_t chunk = kPartChunk);
+
+/// Neighboring triangles that stay together.
+struct ObjectChunk {
+  SurfaceRange surfaces;
+  glm::dvec3 center{0.0};
+};
+/// Partitions chunks as partition_objects does those of a scene.
+[[nodiscard]] std::vector<std::vector<SurfaceRange>> partition_chunks(std::vector<ObjectChunk> chunks, int parts);
 
 /// Which ranks form which group: contiguous, sizes differing by one at most.
 [[nodiscard]] std::vector<std::vector<int>> make_groups(int ranks, int groups);

@@ -29,6 +29,11 @@ struct Region {
   Rect tiles;
 };
 
+Rect joined(const Rect& a, const Rect& b) {
+  if (a.empty()) return b;
+  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
+}
+
 Rect tiles_around(const Rect& pixels) {
   const auto end = [](int pixel) { return (pixel + kTileSide - 1) / kTileSide; };
   return {pixels.x0 / kTileSide, pixels.y0 / kTileSide, end(pixels.x1), end(pixels.y1)};
@@ -101,7 +106,7 @@ class Grouping {
 
  private:
   [[nodiscard]] double work(const Item& item) const {
-    return item.triangles * speeds_.triangle + item.pixels * (speeds_.pixel + speeds_.light);
+    return item.triangles * speeds_.triangle + item.pixels * speeds_.pixel;
   }
 
   void divide(std::vector<Item> items, std::vector<Region> regions, int first_rank, int ranks) {
@@ -289,12 +294,13 @@ class Grouping {
   ViewGroups groups_;
 };
 
-/// Sums of something over the tiles of one screen, made of rectangles.
+/// Sums of something over a rectangle of one screen's tiles, made of rectangles inside it.
 class RectSums {
  public:
-  void reset(Size grid) {
-    grid_ = grid;
-    sums_.assign(static_cast<std::size_t>(grid.width + 1) * static_cast<std::size_t>(grid.height + 1), 0.0);
+  void reset(const Rect& bounds) {
+    bounds_ = bounds;
+    grid_ = {bounds.width(), bounds.height()};
+    sums_.assign(static_cast<std::size_t>(grid_.width + 1) * static_cast<std::size_t>(grid_.height + 1), 0.0);
   }
   void add(const Rect& tiles, double value) {
     at(tiles.x0, tiles.y0) += value;
@@ -304,18 +310,20 @@ class RectSums {
   }
   /// Once, after all add().
   void sum_up() {
-    for (int y = 0; y <= grid_.height; ++y) {
-      for (int x = 1; x <= grid_.width; ++x) at(x, y) += at(x - 1, y);
+    for (int y = bounds_.y0; y <= bounds_.y1; ++y) {
+      for (int x = bounds_.x0 + 1; x <= bounds_.x1; ++x) at(x, y) += at(x - 1, y);
     }
-    for (int y = 1; y <= grid_.height; ++y) {
-      for (int x = 0; x <= grid_.width; ++x) at(x, y) += at(x, y - 1);
+    for (int y = bounds_.y0 + 1; y <= bounds_.y1; ++y) {
+      for (int x = bounds_.x0; x <= bounds_.x1; ++x) at(x, y) += at(x, y - 1);
     }
   }
   double& at(int x, int y) {
-    return sums_[static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.width + 1) + static_cast<std::size_t>(x)];
+    return sums_[static_cast<std::size_t>(y - bounds_.y0) * static_cast<std::size_t>(grid_.width + 1) +
+                 static_cast<std::size_t>(x - bounds_.x0)];
   }
 
  private:
+  Rect bounds_;
   Size grid_;
   std::vector<double> sums_;
 };
@@ -343,15 +351,18 @@ class Completion {
       const auto& parts = groups_.parts[rank];
       for (std::size_t first = 0, last = 0; first < parts.size(); first = last) {
         const std::uint32_t screen = chunks_[parts[first].chunk].screen;
-        const Size grid = layout_.tile_grid(screen);
-        counts.reset(grid);
-        pixels.reset(grid);
+        Rect bounds;
+        for (last = first; last < parts.size() && chunks_[parts[last].chunk].screen == screen; ++last) {
+          bounds = joined(bounds, parts[last].tiles);
+        }
+        counts.reset(bounds);
+        pixels.reset(bounds);
         for (last = first; last < parts.size() && chunks_[parts[last].chunk].screen == screen; ++last) {
           add(parts[last], counts, pixels, groups_.draw_ns[rank]);
         }
         counts.sum_up();
         pixels.sum_up();
-        collect(static_cast<int>(rank), screen, grid, counts, pixels);
+        collect(static_cast<int>(rank), screen, bounds, counts, pixels);
       }
     }
   }
@@ -413,9 +424,9 @@ class Completion {
                chunk.covered * static_cast<double>(part.tiles.area()) / whole * speeds_.pixel;
   }
 
-  void collect(int rank, std::uint32_t screen, Size grid, RectSums& counts, RectSums& pixels) {
-    for (int y = 0; y < grid.height; ++y) {
-      for (int x = 0; x < grid.width; ++x) {
+  void collect(int rank, std::uint32_t screen, const Rect& bounds, RectSums& counts, RectSums& pixels) {
+    for (int y = bounds.y0; y < bounds.y1; ++y) {
+      for (int x = bounds.x0; x < bounds.x1; ++x) {
         if (counts.at(x, y) < 0.5) continue;
         const std::size_t tile = layout_.tile_at(screen, x * kTileSide, y * kTileSide);
         // Of surfaces behind each other one is left.
@@ -489,11 +500,20 @@ double ViewGroups::slowest_ns() const {
   return slowest(draw_ns) + slowest(merge_ns) + slowest(light_ns);
 }
 
+double ViewGroups::ideal_ns() const {
+  const auto mean = [](const std::vector<double>& of_ranks) {
+    return std::accumulate(of_ranks.begin(), of_ranks.end(), 0.0) /
+           static_cast<double>(std::max<std::size_t>(of_ranks.size(), 1));
+  };
+  return mean(draw_ns) + mean(merge_ns) + mean(light_ns);
+}
+
 ViewGroups group_by_view(const FrameLayout& layout, std::span<const ScreenChunk> chunks, int ranks,
                          const DrawSpeeds& speeds, std::span<const double> light_costs) {
   HPR_CHECK(ranks > 0 && (light_costs.empty() || light_costs.size() == layout.tiles()));
   ViewGroups groups = Grouping(layout, chunks, ranks, speeds).group();
   complete(groups, layout, chunks, speeds, light_costs, {});
+  groups.made_unevenness = groups.unevenness();
   return groups;
 }
 
@@ -524,9 +544,13 @@ ViewGroups follow_view(const ViewGroups& old, std::span<const ScreenChunk> old_c
     }
   }
   complete(kept, layout, chunks, speeds, light_costs, old.owners);
+  kept.made_unevenness = old.made_unevenness;
+  if (kept.unevenness() <= (1.0 + kMinRegroupGain) * old.made_unevenness) return kept;
   ViewGroups anew = Grouping(layout, chunks, static_cast<int>(old.parts.size()), speeds).group();
   complete(anew, layout, chunks, speeds, light_costs, old.owners);
-  return kept.slowest_ns() > (1.0 + kMinRegroupGain) * anew.slowest_ns() ? anew : kept;
+  ViewGroups& chosen = kept.slowest_ns() > (1.0 + kMinRegroupGain) * anew.slowest_ns() ? anew : kept;
+  chosen.made_unevenness = chosen.unevenness();
+  return std::move(chosen);
 }
 
 std::vector<SurfaceRange> drawn_surfaces(const ViewGroups& groups, std::span<const ScreenChunk> chunks, int rank,
@@ -549,9 +573,7 @@ Rect drawn_area(const ViewGroups& groups, const FrameLayout& layout, std::span<c
   Rect tiles;
   for (const Part& part : groups.parts.at(static_cast<std::size_t>(rank))) {
     if (chunks[part.chunk].screen != screen) continue;
-    tiles = tiles.empty() ? part.tiles
-                          : Rect{std::min(tiles.x0, part.tiles.x0), std::min(tiles.y0, part.tiles.y0),
-                                 std::max(tiles.x1, part.tiles.x1), std::max(tiles.y1, part.tiles.y1)};
+    tiles = joined(tiles, part.tiles);
   }
   const Size size = layout.size(screen);
   return intersection({tiles.x0 * kTileSide, tiles.y0 * kTileSide, tiles.x1 * kTileSide, tiles.y1 * kTileSide},

@@ -49,23 +49,28 @@ struct ViewGroups {
   std::vector<double> light_ns;  ///< per rank, lighting them
   /// Pixels times ranks that draw there by pixels, both of tiles that anybody may draw into: 1 where no tile is shared.
   double overlap = 1.0;
+  /// slowest_ns() by ideal_ns() when the groups were made, or last compared with others.
+  double made_unevenness = 1.0;
 
   /// Draw, merge and light, each of its slowest rank.
   [[nodiscard]] double slowest_ns() const;
+  /// What these would take if every rank had as much to do.
+  [[nodiscard]] double ideal_ns() const;
+  [[nodiscard]] double unevenness() const { return ideal_ns() > 0.0 ? slowest_ns() / ideal_ns() : 1.0; }
 };
 
 /// Groups `chunks` (ascending by screen, then surface) for `ranks` ranks: halved recursively together with the screens,
-/// by where they lie on them, so that each half's work is even, across the axis that leaves fewer pixels in the other
-/// half. A chunk that reaches into the other half goes to one of them, or is drawn in both, each its own tiles of it,
-/// where that takes less than merging. Owners of tiles are chosen so that merging and light are even. `light_costs`:
-/// per tile what its light took before, in any unit; empty: not known. After Samanta, Funkhouser, Li, Singh, "Hybrid
-/// Sort-First and Sort-Last Parallel Rendering with a Cluster of PCs", 2000.
+/// by where they lie on them, so that each half's drawing is even, across the axis that leaves fewer pixels in the
+/// other half. A chunk that reaches into the other half goes to one of them, or is drawn in both, each its own tiles of
+/// it, where that takes less than merging. Owners of tiles are chosen so that merging and light are even.
+/// `light_costs`: per tile what its light took before, in any unit; empty: not known. After Samanta, Funkhouser, Li,
+/// Singh, "Hybrid Sort-First and Sort-Last Parallel Rendering with a Cluster of PCs", 2000.
 [[nodiscard]] ViewGroups group_by_view(const FrameLayout& layout, std::span<const ScreenChunk> chunks, int ranks,
                                        const DrawSpeeds& speeds, std::span<const double> light_costs = {});
 
 /// The groups of another view, `chunks`, by the same ranks: chunks stay with the rank that drew them for the view
-/// before, `old_chunks`, and new ones go to whose region they lie in. Where grouping anew makes the slowest rank faster
-/// by more than kMinRegroupGain, that is done instead.
+/// before, `old_chunks`, and new ones go to whose region they lie in. Where that has become less even by more than
+/// kMinRegroupGain, and grouping anew makes the slowest rank faster by more than that, it is done.
 [[nodiscard]] ViewGroups follow_view(const ViewGroups& old, std::span<const ScreenChunk> old_chunks,
                                      const FrameLayout& layout, std::span<const ScreenChunk> chunks,
                                      const DrawSpeeds& speeds, std::span<const double> light_costs = {});

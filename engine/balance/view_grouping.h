@@ -13,8 +13,8 @@ namespace hpr {
 
 class Session;
 
-/// What a view shows of the scene's chunks on each of its screens, ascending by screen, then surface. The same on all
-/// ranks.
+/// Collective. What a view shows of the scene's chunks on each of its screens, ascending by screen, then surface. The
+/// same on all ranks, of which each bounds some.
 [[nodiscard]] std::vector<ScreenChunk> chunks_on_screens(Session& session, std::span<const View> views);
 
 /// The groups of a frame that follow its view (ViewGroups), from frame to frame. Every rank holds the whole scene, so
@@ -22,12 +22,13 @@ class Session;
 class ViewGrouping {
  public:
   ViewGrouping() = default;
-  /// Groups the chunks that `views` show. All of it is computed alike on every rank: `light_costs` and `speeds` are the
-  /// same on all.
+  /// Collective. Groups the chunks that `views` show. All of it is computed alike on every rank: `light_costs` and
+  /// `speeds` are the same on all.
   ViewGrouping(Session& session, const FrameLayout& layout, std::span<const View> views, const DrawSpeeds& speeds,
                std::span<const double> light_costs);
 
-  /// The groups for other views of these screens; the same views, however they are jittered, change nothing.
+  /// Collective. The groups for other views of these screens; the same views, however they are jittered, change
+  /// nothing.
   void follow(Session& session, const FrameLayout& layout, std::span<const View> views, const DrawSpeeds& speeds,
               std::span<const double> light_costs);
 
