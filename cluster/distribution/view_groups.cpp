@@ -100,7 +100,7 @@ class Grouping {
       const Size grid = layout_.tile_grid(screen);
       regions.push_back({static_cast<std::uint32_t>(screen), {0, 0, grid.width, grid.height}});
     }
-    divide(std::move(items), std::move(regions), 0, static_cast<int>(groups_.parts.size()));
+    divide(std::move(items), regions, 0, static_cast<int>(groups_.parts.size()));
     return std::move(groups_);
   }
 
@@ -109,7 +109,7 @@ class Grouping {
     return item.triangles * speeds_.triangle + item.pixels * speeds_.pixel;
   }
 
-  void divide(std::vector<Item> items, std::vector<Region> regions, int first_rank, int ranks) {
+  void divide(std::vector<Item> items, const std::vector<Region>& regions, int first_rank, int ranks) {
     if (ranks == 1) {
       auto& parts = groups_.parts[static_cast<std::size_t>(first_rank)];
       for (const Item& item : items) parts.push_back(item.part);
@@ -130,8 +130,8 @@ class Grouping {
     items.clear();
     items.shrink_to_fit();
     auto [first, second] = cut_regions(regions, best.cut);
-    divide(std::move(best.first), std::move(first), first_rank, half);
-    divide(std::move(best.second), std::move(second), first_rank + half, ranks - half);
+    divide(std::move(best.first), first, first_rank, half);
+    divide(std::move(best.second), second, first_rank + half, ranks - half);
   }
 
   void set_region(const Region& region, int rank) {
@@ -393,7 +393,7 @@ class Completion {
     std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return lights[a] > lights[b]; });
     for (const std::size_t tile : order) {
       const auto& drawn = drawn_[tile];
-      std::size_t owner = static_cast<std::size_t>(groups_.regions[tile]);
+      auto owner = static_cast<std::size_t>(groups_.regions[tile]);
       double own_pixels = 0.0;
       double least = -1.0;
       for (const DrawnPixels& each : drawn) {

@@ -293,9 +293,9 @@ class Model {
     rounds_ = 1.0;
     work_.overlap = groups.overlap;
     // Every rank bounds some of the chunks, and groups all.
-    const double chunks = static_cast<double>(load_.chunks.size());
+    const auto chunks = static_cast<double>(load_.chunks.size());
     work_.prepare += static_cast<double>(load_.objects.size()) / ranks_ * speeds_.chunk +
-                     chunks * (speeds_.group + static_cast<double>(sizeof(ScreenChunk) / sizeof(Key)) * speeds_.merge) +
+                     chunks * (speeds_.group + static_cast<double>(sizeof(ScreenChunk)) / sizeof(Key) * speeds_.merge) +
                      ranks_ * 100.0 + std::ceil(std::log2(ranks_)) * speeds_.message;
     light_evenly(groups.owners);
   }
