@@ -20,6 +20,7 @@
 #include "engine/balance/load_balance.h"
 #include "raster/chunk_bounds.h"
 #include "raster/gl_context.h"
+#include "raster/raster_speed.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
 #include "rt/trace/primary_rays.h"
@@ -96,6 +97,11 @@ bool Session::draws_by_software() {
   if (of_any(!has_gpu_device())) return true;
   start_gl();
   return of_any(gl_->software());
+}
+
+RasterSpeed Session::measure_raster() {
+  HPR_CHECK(gl_);
+  return measure_raster_speed(*gl_);
 }
 
 std::string Session::gl_description() const {

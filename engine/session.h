@@ -9,6 +9,7 @@
 
 #include "cluster/transport/communicator_wrappers.h"
 #include "image/tiles.h"
+#include "raster/raster_speed.h"
 #include "rt/ray_settings.h"
 #include "scene/load_scene.h"
 #include "scene/requirements.h"
@@ -63,6 +64,8 @@ class Session {
   void start_gl();
   /// Collective. Whether the CPU of any rank does OpenGL's work; starts OpenGL only where a rank may have a GPU.
   [[nodiscard]] bool draws_by_software();
+  /// How fast OpenGL draws on this rank; after start_gl().
+  [[nodiscard]] RasterSpeed measure_raster();
   /// Renderer, version and device of OpenGL, for people.
   [[nodiscard]] std::string gl_description() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }

@@ -161,6 +161,7 @@ std::vector<std::vector<ScreenRect>> assign_tiles(const FrameLayout& layout, con
 std::vector<std::vector<SurfaceRange>> partition_objects(const Scene& scene, int parts, std::uint32_t chunk) {
   HPR_CHECK(parts > 0 && chunk > 0);
   if (!scene.parts.empty()) {
+    if (parts == 1) return {{{0, scene.triangles}}};
     HPR_CHECK(scene.parts.size() == static_cast<std::size_t>(parts));
     return scene.parts;
   }

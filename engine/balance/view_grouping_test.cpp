@@ -3,11 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <glm/geometric.hpp>
 #include <mutex>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -80,30 +80,47 @@ Options with(Options options, const Options& more) {
   return options;
 }
 
-TEST(ViewGrouping, FramesOfEverySceneHaveTheBitsOfOneRank) {
-  for (const char* const scene : {"gen:gallery?s=1&n=1&k=1", "gen:sphereflake?s=2&n=2", "gen:tetra?s=10",
-                                  "gen:asteroids?count=30&k=2", "gen:cloud?count=500", "gen:cornell"}) {
-    const std::vector<Rgb> expected = draw(1, scene, {});
-    ASSERT_FALSE(expected.empty());
-    const bool is_first = scene == std::string_view("gen:gallery?s=1&n=1&k=1");
-    for (const int ranks : is_first ? std::vector{2, 3, 4, 5, 6, 7, 8} : std::vector{3, 8}) {
-      EXPECT_TRUE(draw(ranks, scene, kByView) == expected) << scene << ranks;
-    }
+/// The letters and digits of a text, to name a test by.
+std::string letters_of(std::string text) {
+  std::erase_if(text, [](unsigned char c) { return std::isalnum(c) == 0; });
+  return text;
+}
+
+class ViewGroupingOfScene : public testing::TestWithParam<const char*> {};
+
+TEST_P(ViewGroupingOfScene, FramesHaveTheBitsOfOneRank) {
+  const std::string scene = GetParam();
+  const std::vector<Rgb> expected = draw(1, scene, {});
+  ASSERT_FALSE(expected.empty());
+  for (const int ranks : {2, 3, 8}) {
+    EXPECT_TRUE(draw(ranks, scene, kByView) == expected) << ranks;
   }
 }
 
-TEST(ViewGrouping, SoTheyHaveHoweverTheyAreMade) {
+INSTANTIATE_TEST_SUITE_P(Scenes, ViewGroupingOfScene,
+                         testing::Values("gen:gallery?s=1&n=1&k=1", "gen:sphereflake?s=2&n=2", "gen:tetra?s=10",
+                                         "gen:asteroids?count=30&k=2", "gen:cloud?count=500", "gen:cornell"),
+                         [](const auto& named) { return letters_of(named.param); });
+
+class ViewGroupingWith : public testing::TestWithParam<Options> {};
+
+TEST_P(ViewGroupingWith, FramesHaveTheBitsOfOneRank) {
   const std::string scene = "gen:sphereflake?s=2&n=2";
-  for (const Options& options :
-       {Options{{"spp", "16"}, {"filter", "mitchell"}}, Options{{"spp", "8"}, {"adaptive", "true"}},
-        Options{{"depth-format", "16"}}, Options{{"shading", "local"}}, Options{{"passes", "shadow"}, {"spp", "2"}},
-        Options{{"balance", "static"}}, Options{{"balance", "measured"}}, Options{{"verify", "100"}}}) {
-    const std::vector<Rgb> expected = draw(1, scene, options);
-    for (const int ranks : {2, 7}) {
-      EXPECT_TRUE(draw(ranks, scene, with(kByView, options)) == expected) << options.front().first << ranks;
-    }
+  const std::vector<Rgb> expected = draw(1, scene, GetParam());
+  for (const int ranks : {2, 7}) {
+    EXPECT_TRUE(draw(ranks, scene, with(kByView, GetParam())) == expected) << ranks;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Options, ViewGroupingWith,
+                         testing::Values(Options{{"spp", "16"}, {"filter", "mitchell"}},
+                                         Options{{"spp", "8"}, {"adaptive", "true"}}, Options{{"depth-format", "16"}},
+                                         Options{{"shading", "local"}}, Options{{"passes", "shadow"}, {"spp", "2"}},
+                                         Options{{"balance", "static"}}, Options{{"balance", "measured"}},
+                                         Options{{"verify", "100"}}),
+                         [](const auto& named) {
+                           return letters_of(named.param.front().first + named.param.front().second);
+                         });
 
 TEST(ViewGrouping, WhoNamesAStrategyOrGroupsGetsGroupsOfTilesCutBeforehand) {
   const std::string scene = "gen:cornell";

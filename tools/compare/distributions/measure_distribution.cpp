@@ -92,6 +92,11 @@ class DistributionBench {
     return whole;
   }
 
+  /// Collective. What a frame was to take, once some were drawn.
+  [[nodiscard]] std::optional<double> predict() {
+    return predict_frame_ms(session_, plan(), maker_.blocks().views, maker_.times().samples);
+  }
+
   /// Collective. The compositing strategy at work.
   [[nodiscard]] std::string strategy() {
     const std::vector<int>& group = plan().mine.group;
@@ -172,7 +177,7 @@ DistributionRun measure_distribution(Communicator& comm, const Globals& globals,
         is_local ? hash_of(frame_colors(whole.keys, true)) : hex16(xxh64(std::as_bytes(whole.keys.pixels())));
   });
   run.strategy = bench.strategy();
-  run.predicted_ms = predict_frame_ms(session, bench.plan());
+  run.predicted_ms = bench.predict();
   return run;
 }
 
