@@ -379,14 +379,15 @@ std::string distribution_html(const DistributionReport& report) {
        Fact{"Frames", fmt::format("{} per run", first.ms.size())}});
   page += summary(report);
   page += "<h2>What a frame is spent on</h2>\n";
-  page +=
-      html_figure(plot_stages(report),
-                  "Medians of the frames. A part lasts from when the last rank was done with the parts before it to "
-                  "when the last rank was done with it, so that waiting counts as what was waited for. Exchange is all "
-                  "that moves besides layers of keys that are merged: keys to the owners of tiles, light that other "
-                  "ranks made, tiles to screens. The rest is sums of samples and exposure. Whiskers reach from the "
-                  "fastest frame to "
-                  "the 95th percentile; where one has no end on the right it goes on.");
+  page += html_figure(
+      plot_stages(report),
+      "Medians of the frames. A part lasts from when the last rank was done with the parts before it to "
+      "when the last rank was done with it, so that waiting counts as what was waited for. Exchange is all "
+      "that moves besides layers of keys that are merged: keys to the owners of tiles, light that other "
+      "ranks made, tiles to screens. The rest is between samples and frames: what ranks agree on, sums, exposure. "
+      "With several samples these are sums over them. Whiskers reach from the "
+      "fastest frame to "
+      "the 95th percentile; where one has no end on the right it goes on.");
   page += "<h2>Memory</h2>\n" + html_figure(plot_memory(report), escape_markup(memory_note(report)));
   const auto best = fastest_runs(report);
   const auto& runs = report.runs;
