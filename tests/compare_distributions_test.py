@@ -104,7 +104,7 @@ def on_threads(folder):
     expect("one process" in lines[-1], f"whose memory: {text.stdout}")
     expect(len(json.loads((folder / "t.json").read_text())["traceEvents"]) > 10, "an empty trace")
     parts = rows_of(run(folder, *threads, "--distribute", "all", "--data", "partitioned", "--json"))
-    expect({row["distribution"] for row in parts} == {"sort-last", "auto"}, f"what partitioned data excludes is left out: {parts}")
+    expect({row["distribution"] for row in parts} == {"sort-last", "hybrid", "auto"}, f"what partitioned data excludes is left out: {parts}")
     expect(all(row["differing_pixels"] == 0 for row in parts), f"{parts}")
     small = rows_of(run(folder, *threads, "--distribute", "sort-last", "--resolution-scale", "0.5", "--shading", "local", "--json"))
     expect([row["frame_xxh64"] == row["picture_xxh64"] for row in small] == [False], f"colors of keys are the picture: {small}")
@@ -153,7 +153,7 @@ def refused(folder):
                                  ([*frames, "all", "--operator", "over8"], 2, "--operator"),
                                  ([*frames, "all", "--simulate", "hosts=2,ranks=4"], 2, "--simulate"),
                                  ([*frames, "all", "--spp", "until:1s"], 2, "--spp 16"),
-                                 ([*frames, "hybrid", "--data", "partitioned"], 2, "sort-last"),
+                                 ([*frames, "sort-first", "--data", "partitioned"], 2, "sort-last"),
                                  ([*frames, "all", "--strategy", "tre"], 2, "did you mean 'tree'"),
                                  ([*frames, "all", "--raw", "x.keys", "--shading", "local"], 2, "--shading deferred"),
                                  ([*frames, "all", "-o", "x.exr"], 2, ".png"),
