@@ -233,7 +233,7 @@ TEST(MeasureDistribution, EveryDistributionMakesTheFrameOfOneRank) {
     EXPECT_EQ(run.strategy == kNoStrategy, draws_alone(at_work)) << name;
     for (std::size_t i = 0; i < run.ms.size(); ++i) {
       EXPECT_GT(run.draw_ms[i], 0.0);
-      EXPECT_GT(run.light_ms[i], 0.05 * run.ms[i]);
+      EXPECT_GT(run.light_ms[i], 0.0);
       EXPECT_GT(run.collect_ms[i], 0.0);
       EXPECT_GE(run.exchange_ms[i], run.collect_ms[i]);
       if (run.strategy == kNoStrategy) continue;
