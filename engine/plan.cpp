@@ -437,17 +437,12 @@ FrameLayout layout_of(std::span<const View> views) {
   return FrameLayout(std::move(sizes));
 }
 
-FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
-  const int ranks = session.comm().size();
+namespace {
+
+/// What the settings say, whoever does it.
+FramePlan plan_of(const FrameSettings& settings, std::span<const View> views) {
   FramePlan plan;
   plan.layout = layout_of(views);
-
-  const Choice choice = choose_distribution(settings, session.scene(), ranks);
-  plan.distribution = choice.distribution;
-  const int parts = static_cast<int>(session.scene().parts.size());
-  plan.groups =
-      parts > 0 ? ranks / parts : std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
-  check_parts(settings, plan, session.scene(), ranks);
   plan.strategy = !settings.strategy.empty() ? settings.strategy : "auto";
   plan.depth_format = settings.depth_format;
   plan.shading = settings.shading;
@@ -459,28 +454,52 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   }
   plan.verify_percent = settings.verify_percent;
   plan.balance = settings.balance;
-  const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
-  plan.primary = primary.primary;
-  const bool by_view = groups_follow_view(plan, settings, session.scene(), ranks);
+  return plan;
+}
+
+int groups_of(const FrameSettings& settings, const Scene& scene, int ranks) {
+  if (!scene.parts.empty()) return ranks / static_cast<int>(scene.parts.size());
+  return std::min(settings.groups > 0 ? settings.groups : default_groups(ranks), ranks);
+}
+
+/// Collective where groups follow the view. Who draws what, of a plan that knows its distribution and its primary.
+void assign_ranks(Session& session, const FrameSettings& settings, std::span<const View> views, FramePlan& plan) {
+  const Scene& scene = session.scene();
+  const int ranks = session.ranks();
+  const bool by_view = groups_follow_view(plan, settings, scene, ranks);
   std::vector<Assignment> assigned =
-      assign(by_view ? Distribution::SortFirst : plan.distribution, session.scene(), plan.layout, ranks, plan.groups);
+      assign(by_view ? Distribution::SortFirst : plan.distribution, scene, plan.layout, ranks, plan.groups);
   if (plan.rays.show == Show::Rank) plan.drawn_by.emplace(assigned, plan.layout);
   for (std::size_t rank = 0; rank < assigned.size(); ++rank) {
     if (assigned[rank].group.front() == static_cast<int>(rank)) plan.areas.push_back(assigned[rank].area);
   }
-  plan.mine = std::move(assigned[static_cast<std::size_t>(session.comm().rank())]);
+  plan.mine = std::move(assigned[static_cast<std::size_t>(session.rank())]);
   const bool in_groups = plan.mine.group.size() > 1 || plan.distribution == Distribution::SortMiddle;
-  if ((settings.partitioned && ranks > 1 && in_groups) || parts > 0) partition(session, plan);
+  if ((settings.partitioned && ranks > 1 && in_groups) || !scene.parts.empty()) partition(session, plan);
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
-  if (!covering_surfaces(session.scene(), true).empty()) {
-    plan.mine.objects = common_ranges(merged_ranges(plan.mine.objects, session.scene().triangles),
-                                      covering_surfaces(session.scene(), false));
+  if (!covering_surfaces(scene, true).empty()) {
+    plan.mine.objects =
+        common_ranges(merged_ranges(plan.mine.objects, scene.triangles), covering_surfaces(scene, false));
   }
   plan.tiles = tiles_of(plan.layout, plan.mine.area);
   if (by_view) {
     plan.areas.clear();
     group_by_view(session, plan, views);
   }
+}
+
+}  // namespace
+
+FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
+  const int ranks = session.comm().size();
+  FramePlan plan = plan_of(settings, views);
+  const Choice choice = choose_distribution(settings, session.scene(), ranks);
+  plan.distribution = choice.distribution;
+  plan.groups = groups_of(settings, session.scene(), ranks);
+  check_parts(settings, plan, session.scene(), ranks);
+  const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
+  plan.primary = primary.primary;
+  assign_ranks(session, settings, views, plan);
 
   if (!settings.strategy.empty()) {
     agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });

@@ -177,25 +177,33 @@ class MeshBatch {
   std::size_t waiting_ = 0;
 };
 
+using WantedTriangles = std::vector<std::vector<std::vector<SurfaceRange>>>;  // by part and mesh
+
+/// Adds the parts of a mesh to what ranks are sent; rank 0 takes its own.
+void add_parts(Communicator& comm, const Mesh& whole, std::uint32_t number, const WantedTriangles& wanted, Scene& scene,
+               MeshBatch& batch) {
+  const std::shared_ptr<const PartialMesh> partial = scene.meshes[number].partial;
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  for (std::size_t part = 0; part < wanted.size(); ++part) {
+    if (wanted[part][number].empty()) continue;
+    Mesh mesh = part_of_mesh(whole, wanted[part][number], *partial);
+    for (std::size_t rank = part; rank < ranks; rank += wanted.size()) {
+      if (rank > 0) batch.add(rank, number, mesh);
+    }
+    if (part == 0) scene.meshes[number] = std::move(mesh);
+    if (batch.is_full()) batch.send(comm, More::Comes);
+  }
+}
+
 /// On rank 0: reads the meshes of `scene` one by one and sends each rank what it holds.
 void send_meshes(Communicator& comm, const std::function<Mesh(std::uint32_t)>& whole_mesh, Scene& scene,
                  MeshBatch& batch) {
-  const auto ranks = static_cast<std::size_t>(comm.size());
-  std::vector<std::vector<std::vector<SurfaceRange>>> wanted;  // by part and mesh
+  WantedTriangles wanted;
   for (const std::vector<SurfaceRange>& part : scene.parts) wanted.push_back(triangles_of(scene, part));
   for (std::uint32_t i = 0; i < scene.meshes.size(); ++i) {
-    const std::shared_ptr<const PartialMesh> partial = scene.meshes[i].partial;
-    if (!partial || std::ranges::all_of(wanted, [&](const auto& of_part) { return of_part[i].empty(); })) continue;
-    const Mesh whole = read_whole(whole_mesh, scene, i);
-    for (std::size_t part = 0; part < wanted.size(); ++part) {
-      if (wanted[part][i].empty()) continue;
-      Mesh mesh = part_of_mesh(whole, wanted[part][i], *partial);
-      for (std::size_t rank = std::max<std::size_t>(part, 1); rank < ranks; ++rank) {
-        if (rank % wanted.size() == part) batch.add(rank, i, mesh);
-      }
-      if (part == 0) scene.meshes[i] = std::move(mesh);
-      if (batch.is_full()) batch.send(comm, More::Comes);
-    }
+    const auto is_unwanted = [&](const auto& of_part) { return of_part[i].empty(); };
+    if (!scene.meshes[i].partial || std::ranges::all_of(wanted, is_unwanted)) continue;
+    add_parts(comm, read_whole(whole_mesh, scene, i), i, wanted, scene, batch);
   }
 }
 
@@ -232,11 +240,8 @@ std::vector<std::byte> packed(LoadedScene& loaded, int ranks) {
   strip(loaded);
   const int parts = parts_for(loaded, ranks);
   check_part(loaded, parts);
-  if (parts == 1) {
-    loaded.scene = assembled(std::move(loaded));
-  } else {
-    loaded.scene.parts = partition_objects(loaded.scene, parts);
-  }
+  if (parts == 1) return to_bytes(assembled(std::move(loaded)));
+  loaded.scene.parts = partition_objects(loaded.scene, parts);
   return to_bytes(loaded.scene);
 }
 

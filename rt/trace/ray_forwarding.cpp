@@ -235,8 +235,7 @@ void RayForwarding::fetch_triangles(std::span<const std::uint32_t> ids) {
   if (owners_.is_empty()) return;
   std::vector<std::uint32_t> missing(ids.begin(), ids.end());
   std::ranges::sort(missing);
-  const auto repeated = std::ranges::unique(missing);
-  missing.erase(repeated.begin(), repeated.end());
+  missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
   std::erase_if(missing, [&](std::uint32_t id) { return id == kNoSurface || is_here(id) || triangles_.find(id); });
   if (missing.empty()) return;
   Query query{.kind = {.ask = Ask::Triangles}, .surfaces = missing};
@@ -362,6 +361,14 @@ void RayForwarding::for_each(int threads, std::size_t count, const std::function
   if (all == State::Failed) throw lost();
 }
 
+/// Writes question `i` of a query as it lies in a message.
+template <typename Put>
+void RayForwarding::put_question(const Query& query, std::uint32_t i, const Put& put) {
+  if (query.kind.ask == Ask::Triangles) return put(query.surfaces[i]);
+  put(query.rays->ray(i));
+  if (query.kind.has_passed != 0) put(query.passed[i]);
+}
+
 /// For every rank: how its sender fares, and the rays that go there, query by query.
 std::vector<std::vector<std::byte>> RayForwarding::pack(State mine) const {
   std::vector<std::vector<std::byte>> messages(boxes_.size());
@@ -383,14 +390,7 @@ std::vector<std::vector<std::byte>> RayForwarding::pack(State mine) const {
       Kind kind = query->kind;
       kind.count = static_cast<std::uint32_t>(query->to[rank].size());
       put(kind);
-      for (const std::uint32_t i : query->to[rank]) {
-        if (kind.ask == Ask::Triangles) {
-          put(query->surfaces[i]);
-          continue;
-        }
-        put(query->rays->ray(i));
-        if (kind.has_passed != 0) put(query->passed[i]);
-      }
+      for (const std::uint32_t i : query->to[rank]) put_question(*query, i, put);
     }
   }
   return messages;

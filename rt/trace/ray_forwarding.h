@@ -131,6 +131,8 @@ class RayForwarding {
   void store_answers(std::size_t rank, std::span<const std::byte> answers) const;
   void release(bool answered);
 
+  template <typename Put>
+  static void put_question(const Query& query, std::uint32_t i, const Put& put);
   [[nodiscard]] bool is_here(std::uint32_t surface) const;
   void answer_triangles(const QueryBlock& block) const;
 

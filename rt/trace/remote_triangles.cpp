@@ -8,7 +8,8 @@
 namespace hpr {
 namespace {
 
-enum Array : std::uint32_t { kUv0 = 1, kUv1 = 2, kColors = 4, kTangents = 8 };
+/// A bit of TriangleRecord::arrays.
+enum Array : std::uint32_t { Uv0 = 1, Uv1 = 2, Colors = 4, Tangents = 8 };
 
 template <typename Value>
 void read_corners(const std::vector<Value>& values, const glm::uvec3& corners, std::array<Value, 3>& to) {
@@ -37,10 +38,10 @@ TriangleRecord record_of(const Scene& scene, std::uint32_t surface) {
   TriangleRecord record;
   read_corners(mesh.positions, corners, record.positions);
   read_corners(mesh.normals, corners, record.normals);
-  record.arrays = read_if_any(mesh.uvs[0], corners, kUv0, record.uvs[0]) |
-                  read_if_any(mesh.uvs[1], corners, kUv1, record.uvs[1]) |
-                  read_if_any(mesh.colors, corners, kColors, record.colors) |
-                  read_if_any(mesh.tangents, corners, kTangents, record.tangents);
+  record.arrays = read_if_any(mesh.uvs[0], corners, Uv0, record.uvs[0]) |
+                  read_if_any(mesh.uvs[1], corners, Uv1, record.uvs[1]) |
+                  read_if_any(mesh.colors, corners, Colors, record.colors) |
+                  read_if_any(mesh.tangents, corners, Tangents, record.tangents);
   return record;
 }
 
@@ -48,10 +49,10 @@ std::shared_ptr<const Mesh> mesh_of(const TriangleRecord& record, std::uint32_t 
   auto mesh = std::make_shared<Mesh>();
   mesh->positions = listed(record.positions);
   mesh->normals = listed(record.normals);
-  if ((record.arrays & kUv0) != 0) mesh->uvs[0] = listed(record.uvs[0]);
-  if ((record.arrays & kUv1) != 0) mesh->uvs[1] = listed(record.uvs[1]);
-  if ((record.arrays & kColors) != 0) mesh->colors = listed(record.colors);
-  if ((record.arrays & kTangents) != 0) mesh->tangents = listed(record.tangents);
+  if ((record.arrays & Uv0) != 0) mesh->uvs[0] = listed(record.uvs[0]);
+  if ((record.arrays & Uv1) != 0) mesh->uvs[1] = listed(record.uvs[1]);
+  if ((record.arrays & Colors) != 0) mesh->colors = listed(record.colors);
+  if ((record.arrays & Tangents) != 0) mesh->tangents = listed(record.tangents);
   mesh->triangles = {{0, 1, 2}};
   mesh->material = material;
   return mesh;
