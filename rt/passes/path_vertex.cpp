@@ -31,13 +31,13 @@ class PrimaryVertices {
 
   void find() {
     const std::size_t before = points_.size();
+    if (context_.surfaces.are_shared_out()) fetch_all();
     find_surfaces();
     for (PathVertex& point : std::span(points_).subspan(before)) finish_vertex(context_, point);
   }
 
  private:
   void find_surfaces() {
-    if (context_.surfaces.are_shared_out()) fetch_all();
     if (context_.rays != nullptr && context_.rays->has_alpha_tested()) trace_alpha_tested();
     const std::optional<glm::dvec3> even = context_.even_background();
     prefetch(rows_.first);

@@ -33,14 +33,16 @@ std::optional<double> predict_frame_ms(Session& session, const FramePlan& plan, 
   const double cores = std::max(1U, std::thread::hardware_concurrency());
   speeds.host_ranks = session.ranks();
   speeds.crowding = std::max(1.0, threads * session.ranks() / cores);
+  // What was measured is processor time, of which a rank gets less where ranks crowd the cores.
+  const double ns_per_ms = kNsPerMs * speeds.crowding / threads;
   FrameLoad load = load_of(session, views);
-  for (const double ms : light) load.light_ns.push_back(kNsPerMs * ms / threads);
+  for (const double ms : light) load.light_ns.push_back(ns_per_ms * ms);
   load.by_rays = plan.primary == Primary::Rays;
   if (load.by_rays) {
     const double keys = sum_of(session.balance().costs(plan.layout)) - sum_of(light);
     double pixels = 0.0;
     for (const View& view : views) pixels += static_cast<double>(view.size().area());
-    speeds.ray = kNsPerMs * keys / threads / std::max(pixels, 1.0);
+    speeds.ray = ns_per_ms * keys / std::max(pixels, 1.0);
   } else {
     speeds.raster = session.measure_raster();
   }
