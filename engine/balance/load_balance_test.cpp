@@ -13,12 +13,8 @@
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
-#include "compositing/assembly.h"
 #include "core/progress.h"
-#include "engine/frame_maker.h"
-#include "engine/render_settings.h"
-#include "engine/session.h"
-#include "engine/settings_table.h"
+#include "engine/settings/test_frames.h"
 #include "scene/load_scene.h"
 #include "scene/view.h"
 
@@ -26,13 +22,10 @@ namespace hpr {
 namespace {
 
 using namespace std::chrono_literals;
-using Options = std::vector<std::pair<std::string, std::string>>;
+using test::Options;
 
 RenderSettings settings_with(const Options& options) {
-  RenderSettings settings;
-  set_setting(settings, "primary", "rays");
-  for (const auto& [name, value] : options) set_setting(settings, name, value);
-  return resolve(settings, 1);
+  return test::settings_with(test::joined({{"primary", "rays"}}, options));
 }
 
 /// Two screens beside each other; what is to be seen stands in a corner of the first.
@@ -56,16 +49,11 @@ std::vector<Rgb> draw(const LocalRanks& ranks, const Options& options, std::uint
       Frame* const frame =
           maker.make(screens_of(session.scene(), number), static_cast<std::uint64_t>(number), progress);
       ASSERT_NE(frame, nullptr);
-      const std::vector<int> to_root(maker.blocks().views.size(), 0);
-      session.assembler().assemble(comm, frame->radiance, frame->owned, to_root);
+      test::add_pixels(session, maker, *frame, frame->radiance, pixels);
       const auto works = all_gather_value(comm, maker.times().work);
       if (comm.rank() != 0) continue;
       for (const FrameWork& work : works) {
         if (lent != nullptr) *lent += work.lent;
-      }
-      for (std::size_t screen = 0; screen < to_root.size(); ++screen) {
-        const Image<Rgb> image = to_image(frame->radiance, screen);
-        pixels.insert(pixels.end(), image.pixels().begin(), image.pixels().end());
       }
     }
   });

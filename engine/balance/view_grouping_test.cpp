@@ -13,12 +13,8 @@
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
-#include "compositing/assembly.h"
 #include "core/progress.h"
-#include "engine/frame_maker.h"
-#include "engine/render_settings.h"
-#include "engine/session.h"
-#include "engine/settings_table.h"
+#include "engine/settings/test_frames.h"
 #include "raster/chunk_bounds.h"
 #include "rt/show/show.h"
 #include "scene/load_scene.h"
@@ -27,7 +23,7 @@ namespace hpr {
 namespace {
 
 using namespace std::chrono_literals;
-using Options = std::vector<std::pair<std::string, std::string>>;
+using test::Options;
 
 /// Three screens, each with an eye of its own: one from the scene's camera, one from the midst of what is to be seen,
 /// and one from far. All walk from frame to frame.
@@ -48,11 +44,8 @@ std::vector<View> screens_of(const Scene& scene, int frame) {
 std::vector<Rgb> draw(int ranks, const std::string& scene, const Options& options, bool expect_groups = true) {
   std::vector<Rgb> pixels;
   run_local_ranks({.size = ranks, .hang_timeout = 60s, .disorder = 3}, [&](Communicator& comm) {
-    RenderSettings settings;
-    set_setting(settings, "primary", "raster");
-    set_setting(settings, "passes", "none");
-    for (const auto& [name, value] : options) set_setting(settings, name, value);
-    settings = resolve(settings, 1);
+    const RenderSettings settings =
+        test::settings_with(test::joined({{"primary", "raster"}, {"passes", "none"}}, options));
     Session session(comm, {.threads = 1}, [&] { return load_scene(scene); });
     FrameMaker maker(session, settings.frame, settings.sampling, screens_of(session.scene(), 0), std::nullopt);
     EXPECT_EQ(maker.plan().by_view.has_value(), ranks > 1 && expect_groups);
@@ -61,24 +54,13 @@ std::vector<Rgb> draw(int ranks, const std::string& scene, const Options& option
       Frame* const frame =
           maker.make(screens_of(session.scene(), number), static_cast<std::uint64_t>(number), progress);
       ASSERT_NE(frame, nullptr);
-      const std::vector<int> to_root(maker.blocks().views.size(), 0);
-      session.assembler().assemble(comm, frame->radiance, frame->owned, to_root);
-      if (comm.rank() != 0) continue;
-      for (std::size_t screen = 0; screen < to_root.size(); ++screen) {
-        const Image<Rgb> image = to_image(frame->radiance, screen);
-        pixels.insert(pixels.end(), image.pixels().begin(), image.pixels().end());
-      }
+      test::add_pixels(session, maker, *frame, frame->radiance, pixels);
     }
   });
   return pixels;
 }
 
 const Options kByView{{"distribute", "hybrid"}};
-
-Options with(Options options, const Options& more) {
-  options.insert(options.end(), more.begin(), more.end());
-  return options;
-}
 
 /// The letters and digits of a text, to name a test by.
 std::string letters_of(std::string text) {
@@ -108,7 +90,7 @@ TEST_P(ViewGroupingWith, FramesHaveTheBitsOfOneRank) {
   const std::string scene = "gen:sphereflake?s=2&n=2";
   const std::vector<Rgb> expected = draw(1, scene, GetParam());
   for (const int ranks : {2, 7}) {
-    EXPECT_TRUE(draw(ranks, scene, with(kByView, GetParam())) == expected) << ranks;
+    EXPECT_TRUE(draw(ranks, scene, test::joined(kByView, GetParam())) == expected) << ranks;
   }
 }
 
@@ -127,13 +109,14 @@ TEST(ViewGrouping, WhoNamesAStrategyOrGroupsGetsGroupsOfTilesCutBeforehand) {
   const std::vector<Rgb> expected = draw(1, scene, {});
   for (const Options& options :
        {Options{{"groups", "2"}}, Options{{"strategy", "binary-swap"}}, Options{{"strategy", "direct-send"}}}) {
-    EXPECT_TRUE(draw(4, scene, with(kByView, options), false) == expected) << options.front().first;
+    EXPECT_TRUE(draw(4, scene, test::joined(kByView, options), false) == expected) << options.front().first;
   }
-  EXPECT_TRUE(draw(4, scene, with(kByView, {{"primary", "rays"}}), false) == draw(1, scene, {{"primary", "rays"}}));
+  EXPECT_TRUE(draw(4, scene, test::joined(kByView, {{"primary", "rays"}}), false) ==
+              draw(1, scene, {{"primary", "rays"}}));
 }
 
 TEST(ViewGrouping, ShownRanksAreThoseWhoDrawASurface) {
-  const std::vector<Rgb> shown = draw(3, "gen:sphereflake?s=2&n=2", with(kByView, {{"show", "rank"}}));
+  const std::vector<Rgb> shown = draw(3, "gen:sphereflake?s=2&n=2", test::joined(kByView, {{"show", "rank"}}));
   for (std::uint32_t rank = 0; rank < 3; ++rank) {
     EXPECT_GT(std::ranges::count(shown, distinct_color(rank)), 100) << rank;
   }

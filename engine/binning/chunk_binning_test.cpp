@@ -12,12 +12,8 @@
 
 #include "cluster/transport/collectives.h"
 #include "cluster/transport/local_communicator.h"
-#include "compositing/assembly.h"
 #include "core/progress.h"
-#include "engine/frame_maker.h"
-#include "engine/render_settings.h"
-#include "engine/session.h"
-#include "engine/settings_table.h"
+#include "engine/settings/test_frames.h"
 #include "scene/load_scene.h"
 #include "scene/view.h"
 
@@ -25,13 +21,10 @@ namespace hpr {
 namespace {
 
 using namespace std::chrono_literals;
-using Options = std::vector<std::pair<std::string, std::string>>;
+using test::Options;
 
 RenderSettings settings_with(const Options& options) {
-  RenderSettings settings;
-  set_setting(settings, "primary", "raster");
-  for (const auto& [name, value] : options) set_setting(settings, name, value);
-  return resolve(settings, 1);
+  return test::settings_with(test::joined({{"primary", "raster"}}, options));
 }
 
 /// What some ranks drew of a frame, and what they counted.
@@ -65,20 +58,13 @@ Drawn draw(const std::string& scene, int ranks, const Options& options) {
     Progress progress("none", "sample", 0);
     Frame* const frame = maker.make(screens, 0, progress);
     ASSERT_NE(frame, nullptr);
-    const std::vector<int> to_root(maker.blocks().views.size(), 0);
-    session.assembler().assemble(comm, frame->radiance, frame->owned, to_root);
-    session.assembler().assemble(comm, *frame->keys, frame->owned, to_root);
+    test::add_pixels(session, maker, *frame, frame->radiance, drawn.pixels);
+    test::add_pixels(session, maker, *frame, *frame->keys, drawn.keys);
     const auto raster = all_gather_value(comm, maker.times().raster);
     if (comm.rank() != 0) return;
     drawn.raster = raster;
     drawn.mismatches = maker.verified().mismatches;
     drawn.exchange_ms = maker.times().chunk_exchange_ms;
-    for (std::size_t screen = 0; screen < to_root.size(); ++screen) {
-      const Image<Key> keys = to_image(*frame->keys, screen);
-      drawn.keys.insert(drawn.keys.end(), keys.pixels().begin(), keys.pixels().end());
-      const Image<Rgb> pixels = to_image(frame->radiance, screen);
-      drawn.pixels.insert(drawn.pixels.end(), pixels.pixels().begin(), pixels.pixels().end());
-    }
   });
   return drawn;
 }

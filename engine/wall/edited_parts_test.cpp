@@ -8,13 +8,9 @@
 #include <vector>
 
 #include "cluster/transport/local_communicator.h"
-#include "compositing/assembly.h"
 #include "core/error.h"
 #include "core/progress.h"
-#include "engine/frame_maker.h"
-#include "engine/render_settings.h"
-#include "engine/session.h"
-#include "engine/settings_table.h"
+#include "engine/settings/test_frames.h"
 #include "engine/wall/scene_edits.h"
 #include "scene/load_scene.h"
 #include "scene/view.h"
@@ -23,13 +19,8 @@ namespace hpr {
 namespace {
 
 using namespace std::chrono_literals;
-using Options = std::vector<std::pair<std::string, std::string>>;
-
-RenderSettings settings_with(const Options& options) {
-  RenderSettings settings;
-  for (const auto& [name, value] : options) set_setting(settings, name, value);
-  return resolve(settings, 1);
-}
+using test::Options;
+using test::settings_with;
 
 std::vector<View> screens_of(const Scene& scene) {
   const Camera camera = choose_camera({}, scene);
@@ -41,13 +32,7 @@ void add_frame(Session& session, const RenderSettings& settings, std::vector<Rgb
   Progress progress("none", "sample", 0);
   Frame* const frame = maker.make(screens_of(session.scene()), 0, progress);
   ASSERT_NE(frame, nullptr);
-  const std::vector<int> to_root(maker.blocks().views.size(), 0);
-  session.assembler().assemble(session.comm(), frame->radiance, frame->owned, to_root);
-  if (session.rank() != 0) return;
-  for (std::size_t screen = 0; screen < to_root.size(); ++screen) {
-    const Image<Rgb> image = to_image(frame->radiance, screen);
-    pixels.insert(pixels.end(), image.pixels().begin(), image.pixels().end());
-  }
+  test::add_pixels(session, maker, *frame, frame->radiance, pixels);
 }
 
 /// The bits of a frame, of one after a node moved, and of one without another node.

@@ -103,24 +103,6 @@ Error lost() {
   return {ExitCode::Lost, "another rank failed while rays travelled", "see its own error"};
 }
 
-/// One message to and from every rank; what a rank sends to itself stays.
-std::vector<std::vector<std::byte>> swap_messages(Communicator& comm, std::vector<std::vector<std::byte>> messages) {
-  const auto me = static_cast<std::size_t>(comm.rank());
-  std::vector<std::vector<std::byte>> received(messages.size());
-  std::vector<Outgoing> out;
-  std::vector<int> from;
-  for (std::size_t rank = 0; rank < messages.size(); ++rank) {
-    if (rank == me) continue;
-    out.push_back({static_cast<int>(rank), messages[rank]});
-    from.push_back(static_cast<int>(rank));
-  }
-  comm.exchange(out, from, [&](int sender, std::span<const std::byte> message) {
-    received[static_cast<std::size_t>(sender)].assign(message.begin(), message.end());
-  });
-  received[me] = std::move(messages[me]);
-  return received;
-}
-
 using Ask = RayForwarding::Ask;
 
 /// A ray, or a surface's id.
@@ -429,7 +411,7 @@ void RayForwarding::unpack(std::span<const std::byte> message, std::vector<std::
 
 RayForwarding::State RayForwarding::round(State mine, int threads) {
   const trace::Span span("rays travel");
-  const std::vector<std::vector<std::byte>> arrived = swap_messages(comm_, pack(mine));
+  const std::vector<std::vector<std::byte>> arrived = all_to_all(comm_, pack(mine));
   State all = State::Done;
   for (const auto& message : arrived) {
     const State state = state_in(message);
@@ -442,7 +424,7 @@ RayForwarding::State RayForwarding::round(State mine, int threads) {
   std::vector<std::vector<std::byte>> answers(arrived.size());
   for (std::size_t rank = 0; rank < arrived.size(); ++rank) unpack(arrived[rank], answers[rank], blocks);
   parallel_for(threads, blocks.size(), [&](std::size_t i) { answer(blocks[i]); });
-  const std::vector<std::vector<std::byte>> back = swap_messages(comm_, std::move(answers));
+  const std::vector<std::vector<std::byte>> back = all_to_all(comm_, std::move(answers));
   for (std::size_t rank = 0; rank < back.size(); ++rank) store_answers(rank, back[rank]);
   return all;
 }
