@@ -136,6 +136,7 @@ void write_stats(const std::filesystem::path& path, const RunStats& stats) {
             {"balance", balance_json(stats.balance)},
             {"ranks", stats.ranks}};
   if (stats.budget) json["budget"] = budget_json(to_record(*stats.budget));
+  if (!stats.page_loads.empty()) json["page_loads_per_rank"] = stats.page_loads;
   if (stats.verify) json["verify"] = verify_json(to_record(*stats.verify));
   write_file_atomically(path, json.dump(2) + "\n");
 }

@@ -116,7 +116,7 @@ void photon_gather(benchmark::State& state) {
   for (auto _ : state) {
     const ShadedPoint point(samples[i++ % samples.size()]);
     benchmark::DoNotOptimize(
-        hpr::gather_photons(map, point.surface, point.bsdf, point.material.normal, kGlossyCutoff, found));
+        hpr::gather_photons(map, map.radius(), point.surface, point.bsdf, point.material.normal, kGlossyCutoff, found));
   }
   state.counters["photons"] = static_cast<double>(gathered) / static_cast<double>(samples.size());
 }

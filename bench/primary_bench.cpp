@@ -50,7 +50,7 @@ void measure(const std::string& source, GlContext& context) {
   const double upload_ms = cost_ms([&] {
     rasterizer = std::make_unique<Rasterizer>(context, scene, std::array{SurfaceRange{0, scene.triangles}}, kThreads);
   });
-  const double build_ms = cost_ms([&] { rays = std::make_unique<RayScene>(scene, RaySpace(scene.bounds), kThreads); });
+  const double build_ms = cost_ms([&] { rays = std::make_unique<RayScene>(scene, RaySpace(scene), kThreads); });
   PrimaryRays primary(scene, *rays, kThreads);
   std::size_t own = 0;
   for (const Mesh& mesh : scene.meshes) own += mesh.triangles.size();

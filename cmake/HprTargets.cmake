@@ -1,31 +1,41 @@
-# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ... [TESTS_DRAW]): one folder, one static library, its
-# unit tests beside it; TESTS_DRAW: some of them use OpenGL.
+# hpr_library(name SOURCES ... DEPENDS ... PRIVATE_DEPENDS ... TESTS ...): one folder, one static library, its unit tests
+# beside it.
 function(hpr_library name)
-  cmake_parse_arguments(ARG "TESTS_DRAW" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS;TESTS" ${ARGN})
   add_library(hpr_${name} STATIC ${ARG_SOURCES})
   add_library(hpr::${name} ALIAS hpr_${name})
   target_link_libraries(hpr_${name} PUBLIC hpr::options ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
   target_precompile_headers(hpr_${name} REUSE_FROM hpr_library_headers)
   if(ARG_TESTS AND BUILD_TESTING)
-    set(draw)
-    if(ARG_TESTS_DRAW)
-      set(draw DRAW)
-    endif()
-    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name} ${draw})
+    hpr_unit_test(${name}_test SOURCES ${ARG_TESTS} DEPENDS hpr::${name} PREFIX ${name})
   endif()
 endfunction()
 
-# hpr_unit_test(target SOURCES ... DEPENDS ... PREFIX p [LABELS ...] [TIMEOUT s] [DRAW]): GoogleTests of one process. The
-# label is `unit` (also run under the sanitizers) unless others are given. DRAW: they use OpenGL. Software GL hands the
-# unwinder code made at run time; looking that up, the unwinder allocates while it holds its lock, and an allocation that
-# the address sanitizer unwinds the slow way waits for that lock for ever. So these unwind by frame pointers.
-add_custom_target(hpr_unit_tests)  # every test program with label `unit`: all that the sanitizers need built
+# hpr_links(result target library): whether the target links the library, itself or through others.
+function(hpr_links result target library)
+  set(${result} OFF)
+  get_target_property(links ${target} LINK_LIBRARIES)
+  foreach(link IN LISTS links)
+    if(${result} OR NOT link MATCHES "^hpr::")
+      continue()
+    endif()
+    if(link STREQUAL library)
+      set(${result} ON)
+    else()
+      hpr_links(${result} ${link} ${library})
+    endif()
+  endforeach()
+  set(${result} ${${result}} PARENT_SCOPE)
+endfunction()
+
+# hpr_unit_test(target SOURCES ... DEPENDS ... PREFIX p [LABELS ...] [TIMEOUT s]): GoogleTests of one process. The label is
+# `unit` (also run under the sanitizers) unless others are given; `gl` runs under the address sanitizer only. Programs that
+# link hpr::raster may draw, and software GL hands the unwinder code made at run time; looking that up, the unwinder
+# allocates while it holds its lock, and an allocation that the address sanitizer unwinds the slow way waits for that lock
+# for ever. So these unwind by frame pointers.
+add_custom_target(hpr_unit_tests)  # every test program with label `unit` or `gl`: all that the sanitizers need built
 function(hpr_unit_test target)
-  cmake_parse_arguments(ARG "DRAW" "PREFIX;TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
-  set(environment "${HPR_TEST_ENVIRONMENT}")
-  if(ARG_DRAW)
-    string(REPLACE "fast_unwind_on_malloc=0" "fast_unwind_on_malloc=1" environment "${environment}")
-  endif()
+  cmake_parse_arguments(ARG "" "PREFIX;TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
@@ -38,7 +48,12 @@ function(hpr_unit_test target)
   add_executable(${target} ${ARG_SOURCES})
   target_link_libraries(${target} PRIVATE ${ARG_DEPENDS} GTest::gtest_main)
   target_precompile_headers(${target} REUSE_FROM hpr_test_headers)
-  if("unit" IN_LIST ARG_LABELS)
+  set(environment "${HPR_TEST_ENVIRONMENT}")
+  hpr_links(draws ${target} hpr::raster)
+  if(draws)
+    string(REPLACE "fast_unwind_on_malloc=0" "fast_unwind_on_malloc=1" environment "${environment}")
+  endif()
+  if("unit" IN_LIST ARG_LABELS OR "gl" IN_LIST ARG_LABELS)
     add_dependencies(hpr_unit_tests ${target})
   endif()
   gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}." NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60

@@ -21,6 +21,7 @@ namespace {
 
 using Text = std::array<char, 64>;
 
+constexpr std::int32_t kNobody = -1;
 constexpr std::uint64_t kMagic = 0x3164'7262'7270'6800;
 
 /// Two processes see it. Each field is read for itself: a report may be half an older one.
@@ -29,7 +30,7 @@ struct alignas(64) Slot {
   Text host{};
   Text phase{};
   std::atomic<std::int64_t> frame = -1;
-  std::atomic<std::int32_t> awaited = -1;
+  std::atomic<std::int32_t> awaited = kNobody;
   std::atomic<std::uint64_t> steps = 0;
   std::atomic<std::int64_t> stall_limit_ns = 0;
   std::atomic<std::uint64_t> error = 0;   ///< of the first slot: the hash of the first error that a rank claimed
@@ -62,6 +63,7 @@ std::string describe(int rank, const RankReport& report) {
   std::string text = fmt::format("rank {} on {}: ", rank, report.host);
   text += report.phase.empty() ? "between phases" : report.phase;
   if (report.frame) text += fmt::format(" of frame {}", *report.frame);
+  if (report.awaited_rank == kOtherRanks) return text + ", waiting for other ranks";
   if (report.awaited_rank) text += fmt::format(", waiting for rank {}", *report.awaited_rank);
   return text;
 }
@@ -92,7 +94,7 @@ std::optional<RankReport> JobBoard::read(int rank) const {
   report.host = text_of(slot.host);
   report.phase = text_of(slot.phase);
   if (const std::int64_t frame = slot.frame.load(); frame >= 0) report.frame = static_cast<std::uint64_t>(frame);
-  if (const int awaited = slot.awaited.load(); awaited >= 0) report.awaited_rank = awaited;
+  if (const int awaited = slot.awaited.load(); awaited != kNobody) report.awaited_rank = awaited;
   report.steps = slot.steps.load();
   report.stall_limit = std::chrono::nanoseconds(slot.stall_limit_ns.load());
   return report;
@@ -143,7 +145,7 @@ void report_frame(std::uint64_t frame) {
 }
 
 void report_wait(std::optional<int> awaited_rank) {
-  if (Slot* const slot = reported_to()) slot->awaited.store(awaited_rank.value_or(-1));
+  if (Slot* const slot = reported_to()) slot->awaited.store(awaited_rank.value_or(kNobody));
 }
 
 void report_step() {

@@ -13,13 +13,16 @@
 /// that is gone, and notice one that stands still.
 namespace hpr {
 
+/// In place of a rank that is waited for: several, who knows which.
+inline constexpr int kOtherRanks = -2;
+
 /// What a rank has last reported.
 struct RankReport {
   pid_t process = 0;
   std::string host;
   std::string phase;                        ///< its innermost trace::Span; empty: none
   std::optional<std::uint64_t> frame;       ///< that it draws or drew last
-  std::optional<int> awaited_rank;          ///< that it has been waiting for
+  std::optional<int> awaited_rank;          ///< that it has been waiting for; may be kOtherRanks
   std::uint64_t steps = 0;                  ///< grows while it gets on
   std::chrono::nanoseconds stall_limit{0};  ///< how long no rank may get on; 0: as long as it likes
 };
@@ -66,6 +69,15 @@ void report_frame(std::uint64_t frame);
 void report_wait(std::optional<int> awaited_rank);
 /// Something was finished, by any thread.
 void report_step();
+
+/// Reports a wait as long as it lives: for calls that return when others have come.
+class WaitReport {
+ public:
+  explicit WaitReport(int awaited_rank) { report_wait(awaited_rank); }
+  ~WaitReport() { report_wait(std::nullopt); }
+  WaitReport(const WaitReport&) = delete;
+  WaitReport& operator=(const WaitReport&) = delete;
+};
 /// Returns the one before.
 std::chrono::nanoseconds report_stall_limit(std::chrono::nanoseconds limit);
 

@@ -52,6 +52,18 @@ TEST(JobBoardTest, TellsWhatRanksReport) {
   EXPECT_EQ(describe(1, *report), "rank 1 on " + host_name() + ": composite of frame 57, waiting for rank 0");
 }
 
+TEST(JobBoardTest, TellsOfAWaitAsLongAsItLasts) {
+  const JobBoard board(1);
+  in_rank(board, board.address(), 0, [&] {
+    const trace::Span span("composite");
+    {
+      const WaitReport wait(kOtherRanks);
+      EXPECT_EQ(describe(0, *board.read(0)), "rank 0 on " + host_name() + ": composite, waiting for other ranks");
+    }
+    EXPECT_EQ(describe(0, *board.read(0)), "rank 0 on " + host_name() + ": composite");
+  });
+}
+
 TEST(JobBoardTest, EachPartOfWorkThatManyThreadsShareIsAStep) {
   const JobBoard board(1);
   in_rank(board, board.address(), 0, [] {

@@ -5,11 +5,16 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <ctime>
 #include <exception>
+#include <functional>
 #include <mutex>
+#include <numeric>
+#include <queue>
 #include <thread>
 #include <vector>
 
+#include "core/error.h"
 #include "core/job_board.h"
 #include "core/timing.h"
 
@@ -72,6 +77,14 @@ class Team {
   std::vector<std::jthread> threads_;  ///< last: they end before what they use
 };
 
+thread_local LoopProfile* profile_of_this_thread = nullptr;
+
+double process_ms() {
+  timespec now{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
 }  // namespace
 
 int usable_cores() {
@@ -85,11 +98,16 @@ void parallel_for(int threads, std::size_t count, const std::function<void(std::
   std::atomic<std::size_t> next = 0;
   std::mutex mutex;
   std::exception_ptr first_failure;
+  const std::size_t runs = std::min<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)), count);
+  LoopProfile* const profile = runs > 1 ? profile_of_this_thread : nullptr;
+  std::vector<float>* const body_ms = profile != nullptr ? &profile->begin_loop(count) : nullptr;
   const std::function<void(std::size_t)> work = [&, rank = trace::row_of_this_thread().rank](std::size_t number) {
     const trace::InRow row(number == 0 ? trace::row_of_this_thread() : trace::Row{rank, static_cast<int>(number)});
     try {
       for (std::size_t i = next++; i < count; i = next++) {
+        const double begin_ms = body_ms != nullptr ? thread_ms() : 0.0;
         body(i);
+        if (body_ms != nullptr) (*body_ms)[i] = static_cast<float>(thread_ms() - begin_ms);
         report_step();  // a pass over a large frame is no standstill
       }
     } catch (...) {
@@ -98,14 +116,76 @@ void parallel_for(int threads, std::size_t count, const std::function<void(std::
       if (!first_failure) first_failure = std::current_exception();
     }
   };
-  const std::size_t runs = std::min<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)), count);
   if (runs > 1) {
     thread_local Team team;
     team.run(runs - 1, work);
   } else {
     work(0);
   }
+  if (profile != nullptr) profile->end_loop();
   if (first_failure) std::rethrow_exception(first_failure);
+}
+
+LoopProfile::LoopProfile() : resumed_ms_(thread_ms()), process_begin_ms_(process_ms()) {
+  HPR_CHECK(profile_of_this_thread == nullptr);
+  profile_of_this_thread = this;
+}
+
+LoopProfile::~LoopProfile() {
+  finish();
+}
+
+void LoopProfile::finish() {
+  if (profile_of_this_thread != this) return;
+  profile_of_this_thread = nullptr;
+  end_serial();
+  process_ms_ = process_ms() - process_begin_ms_;
+}
+
+void LoopProfile::end_serial() {
+  const double spent_ms = thread_ms() - resumed_ms_;
+  serial_ms_ += spent_ms;
+  serial_phases_[current_phase()] += spent_ms;
+}
+
+std::vector<float>& LoopProfile::begin_loop(std::size_t count) {
+  end_serial();
+  return loops_.emplace_back(count);
+}
+
+void LoopProfile::end_loop() {
+  resumed_ms_ = thread_ms();
+}
+
+double LoopProfile::loops_ms() const {
+  double sum = 0.0;
+  for (const std::vector<float>& loop : loops_) sum = std::accumulate(loop.begin(), loop.end(), sum);
+  return sum;
+}
+
+double LoopProfile::others_ms() const {
+  return std::max(process_ms_ - serial_ms() - loops_ms(), 0.0);
+}
+
+double LoopProfile::even_ms(int threads) const {
+  return serial_ms() + (loops_ms() + others_ms()) / threads;
+}
+
+double LoopProfile::scheduled_ms(int threads) const {
+  double sum = serial_ms() + others_ms() / threads;
+  for (const std::vector<float>& loop : loops_) {
+    std::priority_queue<double, std::vector<double>, std::greater<>> cores;  // when each is free again
+    for (int i = 0; i < threads; ++i) cores.push(0.0);
+    double last = 0.0;
+    for (const float body : loop) {
+      const double done = cores.top() + static_cast<double>(body);
+      cores.pop();
+      cores.push(done);
+      last = std::max(last, done);
+    }
+    sum += last;
+  }
+  return sum;
 }
 
 }  // namespace hpr

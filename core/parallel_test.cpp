@@ -10,6 +10,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/timing.h"
+
 namespace hpr {
 namespace {
 
@@ -112,6 +114,52 @@ TEST(ParallelFor, GoesOnAfterAFailure) {
 
 TEST(ParallelFor, RethrowsOneOfSeveralExceptions) {
   EXPECT_THROW(parallel_for(4, 100, [](std::size_t) { throw std::runtime_error("all of them"); }), std::runtime_error);
+}
+
+/// Uses so much processor time of this thread.
+void spend(double ms) {
+  const CpuStopwatch watch;
+  while (watch.ms() < ms) {
+  }
+}
+
+TEST(LoopProfile, TellsWhatOneThreadDoesAloneFromWhatLoopsShare) {
+  LoopProfile profile;
+  spend(20.0);
+  parallel_for(2, 10, [](std::size_t i) { spend(i == 9 ? 22.0 : 2.0); });
+  {
+    const trace::Span span("alone");
+    spend(10.0);
+    parallel_for(1, 3, [](std::size_t) { spend(5.0); });  // of one thread: shared by nobody
+    parallel_for(2, 1, [](std::size_t) { spend(5.0); });
+    parallel_for(2, 2, [](std::size_t) {});
+  }
+  profile.finish();
+  spend(10.0);
+  parallel_for(2, 2, [](std::size_t) { spend(5.0); });
+  // Nobody else's work is counted, but reading clocks is.
+  EXPECT_NEAR(profile.serial_ms(), 50.0, 3.0);
+  EXPECT_NEAR(profile.serial_phases().at("alone"), 30.0, 2.0);
+  EXPECT_NEAR(profile.loops_ms(), 40.0, 3.0);
+  EXPECT_LT(profile.others_ms(), 5.0);
+  EXPECT_NEAR(profile.even_ms(1), profile.all_ms(), 1e-3);
+  EXPECT_NEAR(profile.scheduled_ms(1), profile.all_ms(), 1e-3);
+  EXPECT_NEAR(profile.even_ms(4), 50.0 + 10.0, 4.0);
+  EXPECT_NEAR(profile.scheduled_ms(2), 50.0 + 30.0, 5.0) << "9 bodies by two, then one alone";
+  EXPECT_NEAR(profile.scheduled_ms(100), 50.0 + 22.0, 5.0);
+}
+
+TEST(LoopProfile, IsOfTheThreadThatMadeItAndEndsWithIt) {
+  LoopProfile profile;
+  std::jthread([] {
+    LoopProfile own;
+    parallel_for(2, 4, [](std::size_t) { spend(2.0); });
+    own.finish();
+    EXPECT_GT(own.loops_ms(), 7.0);
+  }).join();
+  profile.finish();
+  EXPECT_EQ(profile.loops_ms(), 0.0);
+  EXPECT_THROW(parallel_for(2, 2, [](std::size_t) { throw std::runtime_error("after it"); }), std::runtime_error);
 }
 
 }  // namespace

@@ -42,7 +42,9 @@ const std::vector<SurfaceRange>* surfaces_of(const FramePlan& plan, std::size_t 
 
 void prepare(Session& session, const FramePlan& plan) {
   if (!plan.mine.area.empty() || bins_chunks(session, plan)) {
-    if (plan.primary == Primary::Rays) {
+    if (session.scene().part_pages) {
+      session.partition_rays(plan.rays);  // pages come as they are drawn
+    } else if (plan.primary == Primary::Rays) {
       (void)session.primary_rays(plan.mine.objects, plan.rays);
     } else {
       (void)session.rasterizer(plan.mine.objects);
@@ -52,10 +54,12 @@ void prepare(Session& session, const FramePlan& plan) {
   if (plan.mine.group.size() > 1) (void)session.group(plan.mine.group);
 }
 
-void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
-               FrameTimes& spent) {
-  HPR_CHECK(!plan.by_view || plan.by_view->fits(views));
-  Rasterizer& own = session.rasterizer(plan.mine.objects);
+namespace {
+
+/// raster, of some of this rank's objects.
+void rasterize_objects(Session& session, const FramePlan& plan, std::span<const SurfaceRange> objects,
+                       std::span<const View> views, TileLayer<Key>& keys, FrameTimes& spent) {
+  Rasterizer& own = session.rasterizer(objects);
   const trace::Span span("raster");
   const bool bins = bins_chunks(session, plan);
   Rasterizer& rasterizer = bins && plan.rays.part ? receive_triangles(session, plan, own, views, spent) : own;
@@ -73,9 +77,11 @@ void rasterize(Session& session, const FramePlan& plan, std::span<const View> vi
   }
 }
 
-PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
-                              std::span<TileLayer<Key>* const> keys, FrameWork& work) {
-  PrimaryRays& rays = session.primary_rays(plan.mine.objects, plan.rays);
+/// trace_primary(), through some of this rank's objects.
+PrimaryRayStats trace_objects(Session& session, const FramePlan& plan, std::span<const SurfaceRange> objects,
+                              std::span<const JitteredViews> jittered, std::span<TileLayer<Key>* const> keys,
+                              FrameWork& work) {
+  PrimaryRays& rays = session.primary_rays(objects, plan.rays);
   const trace::Span span("primary rays");
   PrimaryRayStats stats;
   // Ranks that draw for others do not know what those want.
@@ -91,6 +97,26 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
     session.balance().add_keys(plan.layout, rays.costs());
     for (const TileCost& cost : rays.costs()) work.keys_ms += cost.ms;
   }
+  return stats;
+}
+
+}  // namespace
+
+void rasterize(Session& session, const FramePlan& plan, std::span<const View> views, TileLayer<Key>& keys,
+               FrameTimes& spent) {
+  HPR_CHECK(!plan.by_view || plan.by_view->fits(views));
+  session.draw_pages(plan.mine.objects, [&](std::span<const SurfaceRange> objects) {
+    rasterize_objects(session, plan, objects, views, keys, spent);
+  });
+}
+
+PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
+                              std::span<TileLayer<Key>* const> keys, FrameWork& work) {
+  session.partition_rays(plan.rays);
+  PrimaryRayStats stats;
+  session.draw_pages(plan.mine.objects, [&](std::span<const SurfaceRange> objects) {
+    stats += trace_objects(session, plan, objects, jittered, keys, work);
+  });
   return stats;
 }
 

@@ -54,6 +54,7 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   settings_.rays.photon_footprint = plan_.rays.photon_footprint;
   settings_.rays.fits_photons = plan_.rays.fits_photons;
   settings_.primary = plan_.primary;
+  settings_.distribution = plan_.distribution;
   settings_.rays.gather = plan_.rays.gather;
   settings_.indirect_is_chosen = true;
   degradations_ = degradations_for(settings_, plan_passes(session.requirements(), plan_.rays));
@@ -94,6 +95,8 @@ void FrameMaker::plan_for(const Effort& effort, std::span<const View> screens) {
   if (same_plan) return;
   sampler_.reset();  // it holds on to the plan
   plan_ = plan_frame(session_, settings, blocks_.views);
+  frames_of_plan_ = 0;
+  light_was_known_ = false;
   effort_ = effort;
 }
 
@@ -118,6 +121,7 @@ bool FrameMaker::refined(std::span<const View> screens) const {
 
 Frame* FrameMaker::make(std::span<const View> screens, std::uint64_t number, Progress& progress, Interrupt* interrupt) {
   session_.comm().begin_frame(number);
+  session_.forget_unused_texels();
   if (!budget_) {
     plan_for({}, screens);
     make_anew(number, sampling_.goal.samples.value_or(0), progress);
@@ -134,6 +138,17 @@ Frame* FrameMaker::make(std::span<const View> screens, std::uint64_t number, Pro
   return &sampler_->frame();
 }
 
+/// Once it is known what light takes, and from time to time as views move.
+void FrameMaker::choose_distribution_again() {
+  constexpr int kFramesBetweenChoices = 16;
+  if (!plan_.distribution_is_predicted) return;
+  const bool learned_light = !light_was_known_ && !session_.balance().light_costs(plan_.layout).empty();
+  if (++frames_of_plan_ <= kFramesBetweenChoices && !learned_light) return;
+  light_was_known_ = light_was_known_ || learned_light;
+  frames_of_plan_ = 1;
+  choose_again(session_, settings_, blocks_.views, plan_);
+}
+
 void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress) {
   times_before_ = {};
   Sampling sampling = sampling_;
@@ -142,6 +157,7 @@ void FrameMaker::make_anew(std::uint64_t number, std::uint32_t samples, Progress
     if (samples < min_samples(sampling)) sampling.filter.reset();
   }
   sampler_.reset();  // frees its memory before the next one takes some
+  choose_distribution_again();
   update_areas(session_, plan_, blocks_.views);
   sampler_ = std::make_unique<FrameSampler>(session_, plan_, sampling, number, keeps_keys_);
   (void)sampler_->draw(blocks_.views, {}, progress);  // it stops before its goal for a checkpoint only

@@ -62,6 +62,7 @@ class FrameMaker {
 
  private:
   void plan_for(const Effort& effort, std::span<const View> screens);
+  void choose_distribution_again();
   void make_anew(std::uint64_t number, std::uint32_t samples, Progress& progress);
   [[nodiscard]] bool refine(std::span<const View> screens, std::uint64_t number, Interrupt* interrupt);
   void write_report(const Effort& effort, std::uint32_t samples);
@@ -80,6 +81,8 @@ class FrameMaker {
   Effort effort_;  ///< that plan_ is for
   Blocks blocks_;
   FramePlan plan_;
+  int frames_of_plan_ = 0;        ///< since its distribution was last chosen
+  bool light_was_known_ = false;  ///< when that was chosen
   std::vector<View> last_screens_;
   std::unique_ptr<FrameSampler> sampler_;  ///< of the frame at hand, or the picture that is refined
   bool refining_ = false;

@@ -258,7 +258,7 @@ bool FrameSampler::draw(std::span<const View> views, const CheckpointSettings& c
 }
 
 bool FrameSampler::measures_costs() const {
-  return session_.ranks() > 1 && plan_.balance != Balance::Static && !plan_.rays.reference;
+  return plan_.balance != Balance::Static && !plan_.rays.reference;
 }
 
 void FrameSampler::note_costs() {

@@ -28,6 +28,15 @@ enum class Primary {
 };
 inline constexpr std::array<std::string_view, 3> kPrimaryNames{"raster", "rays", "auto"};
 
+/// What a rank holds of the scene.
+enum class SceneData {
+  Replicated,   ///< all of it
+  Partitioned,  ///< what it draws; rays travel
+  Paged,        ///< the same, of which some comes from the disk as it is used, where it is too large for memory
+};
+
+inline constexpr std::array<std::string_view, 3> kDataNames{"replicated", "partitioned", "paged"};
+
 /// How a frame is made; every choice gives the same picture, but for local shading: it has 8 bits a channel, and
 /// coplanar surfaces of different ranks show the brighter colour.
 struct FrameSettings {
@@ -39,13 +48,16 @@ struct FrameSettings {
   DepthFormat depth_format = DepthFormat::Float32;  ///< fewer bits with Raster, which Auto then is
   Shading shading = Shading::Deferred;
   RaySettings rays;
-  bool partitioned = false;         ///< each rank's ray scene holds its share of the objects only, and rays travel
+  SceneData data = SceneData::Replicated;
   bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
   bool single_picture = false;      ///< whether nothing but one sample of one picture is drawn
   bool photons_fit_frame = false;   ///< no more photons a sample than the frame's pixels show
   double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged
   double verify_percent = 0.0;      ///< of the tiles that are drawn again and compared; see engine/verification.h
   std::vector<Aov> aovs;            ///< with deferred shading only
+
+  /// Whether ranks hold parts of the scene.
+  [[nodiscard]] bool in_parts() const { return data != SceneData::Replicated; }
 };
 
 }  // namespace hpr

@@ -23,6 +23,7 @@
 #include "image/image_io.h"
 #include "raster/rasterizer.h"
 #include "rt/passes/pass_list.h"
+#include "scene/pages/part_pages.h"
 
 namespace hpr {
 namespace {
@@ -163,6 +164,9 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
   stats.samples_in_all = times.samples;
   for (const std::size_t sent : all_gather_value(comm, cost.bytes_sent)) stats.bytes_sent += sent;
   stats.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
+  if (const PartPages* const pages = session.scene().part_pages.get()) {
+    stats.page_loads = all_gather_value(comm, pages->loads());
+  }
   return stats;
 }
 
@@ -238,7 +242,7 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
   for (std::size_t screen = 0; screen < screens; ++screen) {
     if (showing.shown_by[screen] != session.rank()) continue;
     if (as_made) {
-      pictures[screen] = join_blocks(display, blocks, screen);
+      pictures[screen] = join_blocks(display, blocks, screen, session.threads());
     } else {
       const PicturePart& made = blocks.made[screen];
       const PicturePart& shown = blocks.shown[screen];
@@ -306,7 +310,7 @@ CollectedPicture::CollectedPicture(Session& session, Frame& frame, const Blocks&
   // What is shown at another size than it was made in is enlarged on rank 0 before it is rounded to display colours.
   if (enlarged() && files_.is_png()) {
     collect(frame.radiance);
-  } else if (!files_.picture.empty() && (!files_.is_png() || !files_.aovs.empty())) {
+  } else if (files_.has_exr()) {
     collect_radiance(session, frame);
   }
   if (!files_.raw.empty() || std::ranges::any_of(files_.aovs, needs_keys)) collect(*frame.keys);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,6 +10,7 @@
 
 #include "cluster/distribution/balance.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "engine/aov.h"
 #include "engine/budget.h"
 #include "engine/display/exposure.h"
@@ -40,18 +42,30 @@ struct Blocks {
 /// `screens` may be blocks of larger ones (join_screens). `scale`: see at_resolution.
 [[nodiscard]] Blocks cut_blocks(std::span<const View> screens, double scale = 1.0);
 
-/// One screen's pixels, put together from its blocks.
+/// One screen's pixels, put together from its blocks. `threads`: for large pictures, most of whose time the system
+/// spends on memory that is touched for the first time.
 template <typename Pixel>
-[[nodiscard]] Image<Pixel> join_blocks(const TileLayer<Pixel>& layer, const Blocks& blocks, std::size_t screen) {
-  Image<Pixel> image;
+[[nodiscard]] Image<Pixel> join_blocks(const TileLayer<Pixel>& layer, const Blocks& blocks, std::size_t screen,
+                                       int threads = 1) {
+  const Rect& whole = blocks.made[screen].pixels;
+  std::vector<std::size_t> tiles;
   for (std::size_t block = 0; block < blocks.views.size(); ++block) {
     if (blocks.screen_of[block] != screen) continue;
-    const Rect& part = blocks.views[block].block;
-    const Rect& all = blocks.made[screen].pixels;
-    if (part == all) return to_image(layer, block);
-    if (image.pixels().empty()) image = Image<Pixel>({all.width(), all.height()});
-    paste(to_image(layer, block), part.x0 - all.x0, part.y0 - all.y0, image);
+    const TileRun run = layer.layout().tiles_of(block);
+    for (std::size_t tile = run.first; tile < run.end(); ++tile) tiles.push_back(tile);
   }
+  Image<Pixel> image({whole.width(), whole.height()});
+  parallel_for(threads, tiles.size(), [&](std::size_t i) {
+    if (!layer.active(tiles[i])) return;
+    const TilePlace location = layer.layout().place(tiles[i]);
+    const Rect& block = blocks.views[location.screen].block;
+    const auto width = static_cast<std::size_t>(location.pixels.width());
+    const auto column = static_cast<std::size_t>(location.pixels.x0 + block.x0 - whole.x0);
+    for (int y = 0; y < location.pixels.height(); ++y) {
+      const auto from = layer.tile(tiles[i]).subspan(static_cast<std::size_t>(y) * kTileSide, width);
+      std::ranges::copy(from, image.row(location.pixels.y0 + y + block.y0 - whole.y0).subspan(column, width).begin());
+    }
+  });
   return image;
 }
 
@@ -87,6 +101,7 @@ struct RunStats {
   RasterStats raster;                            ///< counts summed over ranks, times the slowest rank's
   std::size_t bytes_sent = 0;                    ///< by the frame, to the screens included; summed over ranks
   std::vector<std::uint64_t> memory_peak_bytes;  ///< per rank
+  std::vector<std::uint64_t> page_loads;         ///< per rank, since the scene was loaded; empty: no part has pages
   int ranks = 1;
 };
 
@@ -138,6 +153,8 @@ struct PictureFiles {
   ColorFormat colors = ColorFormat::Float32;  ///< as sent to the rank that writes an .exr
 
   [[nodiscard]] bool is_png() const { return picture.ends_with(".png"); }
+  /// Whether the picture, or what its AOVs go into, is an .exr.
+  [[nodiscard]] bool has_exr() const { return !picture.empty() && (!is_png() || !aovs.empty()); }
   /// Where AOVs go: into the .exr, or FILE.aov.exr beside a .png. Empty when there are none.
   [[nodiscard]] std::string aov_file() const;
   /// For --explain.

@@ -15,6 +15,10 @@
 
 #include "cluster/transport/collectives.h"
 #include "compositing/compositor.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "engine/balance/distribution_choice.h"
 #include "engine/balance/load_balance.h"
 #include "engine/binning/chunk_binning.h"
 #include "engine/display/background.h"
@@ -24,53 +28,12 @@
 #include "rt/sampling/sampling.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
+#include "scene/pages/part_pages.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
 namespace hpr {
 namespace {
-
-/// Past this many triangles a rank's share of the scene matters more than the pixels it composites.
-constexpr std::uint32_t kManyTriangles = 4'000'000;
-
-struct Choice {
-  Distribution distribution;
-  std::string why;
-};
-
-/// Throws Error (Usage) where ranks hold parts of the scene and settings ask for more.
-Choice distribution_of_parts(const FrameSettings& settings, const Scene& scene, int ranks) {
-  const bool in_islands = static_cast<int>(scene.parts.size()) < ranks;
-  if (!in_islands && settings.distribution == Distribution::SortMiddle && settings.primary == Primary::Raster) {
-    return {Distribution::SortMiddle, "as asked"};
-  }
-  const bool in_groups = in_islands || settings.distribution == Distribution::Hybrid;  // of all ranks, it may be
-  const Distribution fits = in_groups ? Distribution::Hybrid : Distribution::SortLast;
-  if (settings.distribution.value_or(fits) != fits) {
-    throw Error(ExitCode::Usage,
-                fmt::format("ranks hold parts of the scene, which --distribute {} needs whole",
-                            name_of(*settings.distribution)),
-                fmt::format("use --distribute {}, or load the scene again", name_of(fits)));
-  }
-  return {fits, in_islands ? fmt::format("{} groups of {} ranks that hold a part of the scene each",
-                                         ranks / static_cast<int>(scene.parts.size()), scene.parts.size())
-                           : "each rank holds a part of the scene"};
-}
-
-Choice choose_distribution(const FrameSettings& settings, const Scene& scene, int ranks) {
-  if (!scene.parts.empty()) return distribution_of_parts(settings, scene, ranks);
-  if (settings.distribution) return {*settings.distribution, "as asked"};
-  if (ranks == 1) return {Distribution::SortFirst, "one rank draws everything"};
-  if (settings.partitioned)
-    return {Distribution::SortLast, "each rank has its own objects, as the data is partitioned"};
-  if (scene.triangles <= kManyTriangles) {
-    return {
-        Distribution::SortFirst,
-        fmt::format("{} triangles are few enough to cull on every rank, and nothing is composited", scene.triangles)};
-  }
-  return {Distribution::Hybrid,
-          fmt::format("{} triangles are shared inside groups, pixels between them", scene.triangles)};
-}
 
 std::string explain_depth(const FramePlan& plan) {
   const char* why = "keys of {} bytes instead of 8 where they are sent, drawn so by OpenGL";
@@ -113,7 +76,7 @@ void check_parts(const FrameSettings& settings, const FramePlan& plan, const Sce
     throw Error(ExitCode::Usage, "--verify has a tile drawn whole by another rank, and ranks hold parts of the scene",
                 "leave it out, or load the scene with --data replicated");
   }
-  if (settings.partitioned && plan.distribution == Distribution::Hybrid && ranks % plan.groups != 0) {
+  if (settings.in_parts() && plan.distribution == Distribution::Hybrid && ranks % plan.groups != 0) {
     throw Error(ExitCode::Usage, fmt::format("{} ranks make no {} groups of one size", ranks, plan.groups),
                 "each group holds all of the scene: choose another number of groups or of ranks");
   }
@@ -124,26 +87,27 @@ void check_parts(const FrameSettings& settings, const FramePlan& plan, const Sce
 /// and would need an Embree scene anew for other objects.
 bool groups_follow_view(const FramePlan& plan, const FrameSettings& settings, const Scene& scene, int ranks) {
   return plan.distribution == Distribution::Hybrid && ranks > 1 && settings.groups == 0 && settings.strategy.empty() &&
-         plan.primary == Primary::Raster && !settings.partitioned && scene.parts.empty();
+         plan.primary == Primary::Raster && !settings.in_parts() && scene.parts.empty();
 }
 
 /// Who draws what, and how it comes together.
-void explain_distribution(FramePlan& plan, const FrameSettings& settings, const Choice& choice, int ranks) {
-  auto& lines = plan.explained;
-  lines.push_back(fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
-                              ranks == 1 ? "" : "s", choice.why));
+std::vector<std::string> explain_distribution(const FramePlan& plan, const FrameSettings& settings,
+                                              const DistributionChoice& choice, int ranks) {
+  std::vector<std::string> lines{fmt::format("distribute: {} over {} rank{} ({})", name_of(plan.distribution), ranks,
+                                             ranks == 1 ? "" : "s", choice.why)};
+  if (!choice.speeds.empty()) lines.push_back(fmt::format("speeds: {}", choice.speeds));
   if (plan.by_view) {
     lines.push_back(fmt::format("groups: by view ({})", describe(*plan.by_view)));
     lines.emplace_back("composite: each tile among the ranks that draw into it (they are known beforehand)");
-    if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
-    return;
+  } else {
+    const char* const why =
+        settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
+    lines.push_back(plan.mine.group.size() > 1
+                        ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
+                        : fmt::format("composite: off (one rank covers each tile)"));
   }
-  const char* const why =
-      settings.strategy.empty() ? "shared memory on one host, else what is predicted to take least" : "as asked";
-  lines.push_back(plan.mine.group.size() > 1
-                      ? fmt::format("composite: {} among {} ranks ({})", plan.strategy, plan.mine.group.size(), why)
-                      : fmt::format("composite: off (one rank covers each tile)"));
   if (plan.depth_format != DepthFormat::Float32) lines.push_back(explain_depth(plan));
+  return lines;
 }
 
 std::string counted(std::size_t count, std::string_view what) {
@@ -175,16 +139,26 @@ std::vector<std::string> describe_lights(const Scene& scene) {
   return parts;
 }
 
+/// What this rank holds of the scene; empty: all of it, as nothing else was asked for.
+std::string explain_data(const Session& session, const FrameSettings& settings, const FramePlan& plan) {
+  if (!plan.rays.part) return settings.in_parts() ? "data: whole (one rank has all of it)" : "";
+  const PartPages* const pages = session.scene().part_pages.get();
+  const char* const why = settings.in_parts() ? "as asked" : "ranks hold parts of the scene";
+  if (pages == nullptr) {
+    return fmt::format("data: partitioned ({}: rays travel to the ranks whose objects they may meet)", why);
+  }
+  return fmt::format(
+      "data: paged ({}: rays wait for the pages they may meet; {} of {} pages of this rank are in memory at a time, "
+      "the "
+      "largest of {})",
+      why, pages->max_resident(), pages->size(), format_bytes(pages->bytes_of_largest()));
+}
+
 /// What lights the pixels, and how many of them.
 void explain_light(Session& session, const FrameSettings& settings, FramePlan& plan) {
   auto& lines = plan.explained;
   if (plan.rays.build != RayBuild{}) lines.push_back(explain(plan.rays.build));
-  if (plan.rays.part) {
-    lines.push_back(fmt::format("data: partitioned ({}: rays travel to the ranks whose objects they may meet)",
-                                settings.partitioned ? "as asked" : "ranks hold parts of the scene"));
-  } else if (settings.partitioned) {
-    lines.emplace_back("data: whole (one rank has all of it)");
-  }
+  if (const std::string data = explain_data(session, settings, plan); !data.empty()) lines.push_back(data);
   lines.push_back(fmt::format("shading: {} ({})", plan.shading == Shading::Deferred ? "deferred" : "local",
                               plan.shading == Shading::Deferred ? "each visible pixel is lit once, after compositing"
                                                                 : "each rank lights all it drew, before compositing"));
@@ -338,11 +312,9 @@ void fit_photons(Session& session, const FrameSettings& settings, FramePlan& pla
   }
 }
 
-// Processor time in ns on an Intel Xeon, as bench/primary_bench.cpp measures it. Only their ratios decide.
-constexpr double kTriangleCost = 100.0;  ///< OpenGL's, beyond what its pixels take
-constexpr double kPixelCost = 100.0;     ///< of rays
-constexpr double kBuildCost = 350.0;     ///< of a triangle in Embree's scene
-constexpr double kStartCost = 52e6;      ///< of OpenGL, with its first shaders
+/// Processor time of OpenGL's start in ns, with its first shaders, on an Intel Xeon, as bench/primary_bench.cpp
+/// measures it. What else keys take is as documented in MachineSpeeds: only ratios decide.
+constexpr double kStartCost = 52e6;
 
 /// What is done once is shared out among so many frames, unless it is known to be for one.
 constexpr double kFrames = 8.0;
@@ -361,14 +333,13 @@ void partition(const Session& session, FramePlan& plan) {
 PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
                                std::span<const View> views) {
   if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
-  KeyWork work{.triangles = session.scene().triangles, .single_picture = settings.single_picture};
-  for (const Mesh& mesh : session.scene().meshes) work.own_triangles += mesh.triangle_count();
+  KeyWork work{.triangles = session.scene().triangles,
+               .own_triangles = mesh_triangles(session.scene()),
+               .single_picture = settings.single_picture};
   for (const View& view : views) work.pixels += view.size().area();
   work.rounds_depth = settings.depth_format != DepthFormat::Float32;
   work.software_gl = work.rounds_depth || session.draws_by_software();
-  work.ray_scene_is_for_keys =
-      !traces_own_rays(plan.rays.show) && std::ranges::none_of(plan_passes(session.requirements(), plan.rays),
-                                                               [](const PassPlan& pass) { return pass.runs; });
+  work.ray_scene_is_for_keys = !traces_rays_beside_keys(session.requirements(), plan.rays);
   return choose_primary(work);
 }
 
@@ -415,11 +386,12 @@ void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan
 PrimaryChoice choose_primary(const KeyWork& work) {
   if (work.rounds_depth) return {Primary::Raster, "OpenGL alone rounds depths"};
   if (!work.software_gl) return {Primary::Raster, "by a GPU"};
-  const double build_ns = work.ray_scene_is_for_keys ? kBuildCost * static_cast<double>(work.own_triangles) : 0.0;
-  const double trace_ns = kPixelCost * static_cast<double>(work.pixels);
+  const MachineSpeeds typical;
+  const double build_ns = work.ray_scene_is_for_keys ? typical.build * static_cast<double>(work.own_triangles) : 0.0;
+  const double trace_ns = typical.ray * static_cast<double>(work.pixels);
   const double rays_ns = trace_ns + build_ns / (work.single_picture ? 1.0 : kFrames);
   const double start_ns = kStartCost / kFrames;
-  const double raster_ns = kTriangleCost * static_cast<double>(work.triangles) + start_ns;
+  const double raster_ns = typical.raster.triangle * static_cast<double>(work.triangles) + start_ns;
   if (rays_ns > raster_ns) {
     return {Primary::Raster, fmt::format("{} pixels are many beside {} triangles{}", work.pixels, work.triangles,
                                          build_ns > 0.0 ? ", as nothing else needs Embree's scene" : "")};
@@ -475,7 +447,7 @@ void assign_ranks(Session& session, const FrameSettings& settings, std::span<con
   }
   plan.mine = std::move(assigned[static_cast<std::size_t>(session.rank())]);
   const bool in_groups = plan.mine.group.size() > 1 || plan.distribution == Distribution::SortMiddle;
-  if ((settings.partitioned && ranks > 1 && in_groups) || !scene.parts.empty()) partition(session, plan);
+  if ((settings.in_parts() && ranks > 1 && in_groups) || !scene.parts.empty()) partition(session, plan);
   // Surfaces of partial coverage have no keys: light finds them before what the keys name.
   if (!covering_surfaces(scene, true).empty()) {
     plan.mine.objects =
@@ -493,23 +465,26 @@ void assign_ranks(Session& session, const FrameSettings& settings, std::span<con
 FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views) {
   const int ranks = session.comm().size();
   FramePlan plan = plan_of(settings, views);
-  const Choice choice = choose_distribution(settings, session.scene(), ranks);
-  plan.distribution = choice.distribution;
-  plan.groups = groups_of(settings, session.scene(), ranks);
-  check_parts(settings, plan, session.scene(), ranks);
   const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
   plan.primary = primary.primary;
+  plan.groups = groups_of(settings, session.scene(), ranks);
+  const DistributionChoice choice = choose_distribution(session, settings, plan, views);
+  plan.distribution = choice.distribution;
+  plan.distribution_is_predicted = choice.is_predicted;
+  check_parts(settings, plan, session.scene(), ranks);
   assign_ranks(session, settings, views, plan);
 
   if (!settings.strategy.empty()) {
     agree_on_failure(session.comm(), [&] { check_fits(plan.strategy, static_cast<int>(plan.mine.group.size())); });
   }
 
-  explain_distribution(plan, settings, choice, ranks);
+  plan.explained = explain_distribution(plan, settings, choice, ranks);
+  plan.explained_distribution = plan.explained.size();
   if (ranks > 1) plan.explained.push_back(explain_balance(plan));
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", primary.why));
   if (plan.distribution == Distribution::SortMiddle) plan.explained.push_back(explain_binning(plan, ranks));
+  if (!session.scene().shapes_note.empty()) plan.explained.push_back("shapes: " + session.scene().shapes_note);
   if (plan.primary == Primary::Raster) session.start_gl();
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
@@ -521,6 +496,25 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
                                          ranks > 1 ? "another rank" : "the same rank, as there is one"));
   }
   return plan;
+}
+
+void choose_again(Session& session, const FrameSettings& settings, std::span<const View> views, FramePlan& plan) {
+  const DistributionChoice choice = choose_distribution(session, settings, plan, views, plan.distribution);
+  if (choice.distribution == plan.distribution) return;
+  log::debug("distribute: {} in place of {}", name_of(choice.distribution), name_of(plan.distribution));
+  FramePlan changed = plan;
+  changed.distribution = choice.distribution;
+  changed.areas.clear();
+  changed.by_view.reset();
+  changed.drawn_by.reset();
+  assign_ranks(session, settings, views, changed);
+  plan_areas(session, changed, views);
+  const auto old_lines = static_cast<std::ptrdiff_t>(plan.explained_distribution);
+  std::vector<std::string> lines = explain_distribution(changed, settings, choice, session.ranks());
+  changed.explained_distribution = lines.size();
+  lines.insert(lines.end(), plan.explained.begin() + old_lines, plan.explained.end());
+  changed.explained = std::move(lines);
+  plan = std::move(changed);
 }
 
 }  // namespace hpr

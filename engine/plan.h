@@ -24,6 +24,7 @@ struct View;
 /// Who does what in a frame; computed alike on every rank.
 struct FramePlan {
   Distribution distribution = Distribution::SortFirst;
+  bool distribution_is_predicted = false;  ///< see choose_again()
   int groups = 1;
   std::string strategy;
   Primary primary = Primary::Raster;  ///< never Auto
@@ -42,6 +43,7 @@ struct FramePlan {
   std::optional<DrawnBy> drawn_by;             ///< where ranks are shown
   std::vector<std::size_t> tiles;              ///< of this rank's group, or that it draws into, ascending
   std::vector<std::string> explained;          ///< one line per decision, with its reason
+  std::size_t explained_distribution = 0;      ///< how many of them, the first ones, say who draws what
 
   /// Whether the picture has an alpha other than 1.
   [[nodiscard]] bool is_transparent() const { return rays.background.kind == Background::Kind::Transparent; }
@@ -52,6 +54,10 @@ struct FramePlan {
 
 /// Collective. Starts OpenGL where the frame is drawn by it, or that is left to whether it has a GPU.
 [[nodiscard]] FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<const View> views);
+
+/// Collective, between frames of a plan whose distribution is predicted: chooses anew, by what the frames before took
+/// and what `views` show.
+void choose_again(Session& session, const FrameSettings& settings, std::span<const View> views, FramePlan& plan);
 
 /// What decides whether OpenGL or rays make the keys of a frame: nothing that a clock says, nor how many ranks share
 /// the work, so that the same picture has the same bits however it is made. Equal on all ranks.

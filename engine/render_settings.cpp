@@ -96,7 +96,7 @@ constexpr std::uint32_t kSeamlessSamples = 4;
 /// In one of so many samples: all of them together are to gather enough. With fewer than four in one they show one by
 /// one; denoised pictures of few samples, whose filter takes each photon's disc for light of its own, need more.
 double photons_to_gather(bool denoise, std::uint32_t samples) {
-  return denoise ? std::clamp(1600.0 / samples, 4.0, 200.0) : std::clamp(256.0 / samples, 4.0, 50.0);
+  return denoise ? std::clamp(800.0 / samples, 4.0, 200.0) : std::clamp(256.0 / samples, 4.0, 50.0);
 }
 
 std::uint32_t samples_of(const RenderSettings& settings) {
@@ -136,12 +136,11 @@ void check_camera(const CameraChoice& camera) {
 
 void check_verify(const FrameSettings& frame) {
   if (frame.verify_percent == 0.0) return;
-  if (frame.shading == Shading::Local || frame.partitioned) {
-    throw Error(
-        ExitCode::Usage,
-        "--verify has a tile drawn whole by another rank, which --shading local and --data partitioned leave to "
-        "many",
-        "use it with --shading deferred and --data replicated");
+  if (frame.shading == Shading::Local || frame.in_parts()) {
+    throw Error(ExitCode::Usage,
+                "--verify has a tile drawn whole by another rank, which --shading local and --data partitioned or "
+                "paged leave to many",
+                "use it with --shading deferred and --data replicated");
   }
   if (!frame.rays.build.same_instructions) {
     throw Error(ExitCode::Usage, "--verify compares bits, which --deterministic off lets differ between machines",
@@ -170,6 +169,28 @@ bool may_be_in_parts(const FrameSettings& frame) {
   return frame.distribution != Distribution::SortFirst;
 }
 
+/// What ranks cannot do that hold parts.
+void check_data(const FrameSettings& frame) {
+  if (frame.in_parts() && !may_be_in_parts(frame)) {
+    throw Error(ExitCode::Usage,
+                fmt::format("--data {} gives each rank its own objects, of which --distribute {} draws others",
+                            kDataNames.at(static_cast<std::size_t>(frame.data)), name_of(*frame.distribution)),
+                frame.data == SceneData::Paged ? "use --distribute sort-last or hybrid, or leave it out"
+                                               : "use --distribute sort-last, sort-middle or hybrid, or leave it out");
+  }
+  if (frame.data == SceneData::Paged && frame.distribution == Distribution::SortMiddle) {
+    throw Error(ExitCode::Usage,
+                "--data paged draws page by page, and --distribute sort-middle sends triangles of all of them",
+                "use --distribute sort-last or hybrid, or leave it out");
+  }
+  if (frame.in_parts() && frame.distribution == Distribution::SortMiddle && frame.primary != Primary::Raster) {
+    throw Error(
+        ExitCode::Usage,
+        "--data partitioned --distribute sort-middle sends triangles for OpenGL to draw, and rays would meet none",
+        "use --primary raster, or --distribute sort-last");
+  }
+}
+
 /// What of the settings excludes each other.
 void check_combination(const RenderSettings& settings) {
   const FrameSettings& frame = settings.frame;
@@ -182,15 +203,7 @@ void check_combination(const RenderSettings& settings) {
     refuse("--depth-format rounds depths before OpenGL compares them; rays compare their own",
            "use it with --primary raster");
   }
-  if (frame.partitioned && !may_be_in_parts(frame)) {
-    refuse(fmt::format("--data partitioned gives each rank its own objects, of which --distribute {} draws others",
-                       name_of(*frame.distribution)),
-           "use --distribute sort-last, sort-middle or hybrid, or leave it out");
-  }
-  if (frame.partitioned && frame.distribution == Distribution::SortMiddle && frame.primary != Primary::Raster) {
-    refuse("--data partitioned --distribute sort-middle sends triangles for OpenGL to draw, and rays would meet none",
-           "use --primary raster, or --distribute sort-last");
-  }
+  check_data(frame);
   const bool splits = std::ranges::any_of(
       frame.aovs, [](Aov layer) { return layer != Aov::Depth && layer != Aov::Id && layer != Aov::Rank; });
   if (frame.rays.reference && (splits || is_local)) {
@@ -276,9 +289,9 @@ Camera choose_camera(const CameraChoice& choice, const Scene& scene) {
   return chosen;
 }
 
-FirstView first_view(const RenderSettings& settings, Size size) {
+FirstViews first_view(const RenderSettings& settings, Size size) {
   return [camera = settings.camera, size](const Scene& scene) {
-    return make_view(choose_camera(camera, scene), size, scene.bounds);
+    return std::vector{make_view(choose_camera(camera, scene), size, scene.bounds)};
   };
 }
 
@@ -289,10 +302,11 @@ LoadedScene load_as_fits(const std::string& source, const RenderSettings& settin
   const FrameSettings& frame = settings.frame;
   const auto in_parts = [&] {
     LoadedScene loaded = load_unshaped_scene(source, limits, settings.scene, true);
+    loaded.in_pages = frame.data == SceneData::Paged;
     if (frame.distribution == Distribution::Hybrid) loaded.islands = frame.groups;
     return loaded;
   };
-  if (frame.partitioned) return in_parts();
+  if (frame.in_parts()) return in_parts();
   try {
     return load_unshaped_scene(source, limits, settings.scene);
   } catch (const Error& error) {
@@ -305,12 +319,25 @@ LoadedScene load_as_fits(const std::string& source, const RenderSettings& settin
 
 /// The framing_camera of a scene of which meshes have no triangles here.
 Camera framing_of(const LoadedScene& loaded) {
+  constexpr std::uint32_t kPiece = 1U << 16U;
   SceneFraming framing(loaded.scene.bounds);
-  for (std::uint32_t mesh = 0; mesh < loaded.scene.meshes.size(); ++mesh) {
-    const Mesh& known = loaded.scene.meshes[mesh];
-    const Mesh read = known.partial ? loaded.whole_mesh(mesh) : Mesh();
+  const auto add = [&](std::uint32_t mesh, const Mesh& vertices) {
     for (const Instance& instance : loaded.scene.instances) {
-      if (instance.mesh == mesh) framing.add(instance, known.partial ? read : known);
+      if (instance.mesh == mesh) framing.add(instance, vertices);
+    }
+  };
+  for (std::uint32_t mesh = 0; mesh < loaded.scene.meshes.size(); ++mesh) {
+    if (!loaded.scene.meshes[mesh].partial) {
+      add(mesh, loaded.scene.meshes[mesh]);
+      continue;
+    }
+    const std::unique_ptr<MeshReader> read = loaded.read_mesh(mesh);
+    std::vector<float> values;
+    for (std::uint32_t first = 0; first < read->vertices(); first += std::min(kPiece, read->vertices() - first)) {
+      Mesh piece;
+      read->read(VertexArray::Positions, first, first + std::min(kPiece, read->vertices() - first), values);
+      append_values(piece, VertexArray::Positions, values);
+      add(mesh, piece);
     }
   }
   return framing.camera();
@@ -319,12 +346,12 @@ Camera framing_of(const LoadedScene& loaded) {
 }  // namespace
 
 LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const SceneLimits& limits,
-                       const ImageLimits& pictures, const FirstView& view) {
+                       const ImageLimits& pictures, const FirstViews& views) {
   LoadedScene loaded = load_as_fits(source, settings, limits);
   Scene& scene = loaded.scene;
   if (has_points_or_lines(scene)) {
-    if (loaded.whole_mesh && scene.cameras.empty()) scene.framing = framing_of(loaded);
-    shape_points_and_lines(scene, settings.widths, view(scene), limits.memory_bytes);
+    if (loaded.read_mesh && scene.cameras.empty()) scene.framing = framing_of(loaded);
+    shape_points_and_lines(scene, settings.widths, views(scene), limits.memory_bytes);
     scene.framing.reset();  // it may be another one now
   }
   set_environment(settings.environment, pictures, scene);

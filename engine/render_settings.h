@@ -85,16 +85,16 @@ struct RenderSettings {
 /// The camera that the settings choose in a scene. Throws Error (Usage) with the choices for a camera there is not.
 [[nodiscard]] Camera choose_camera(const CameraChoice& choice, const Scene& scene);
 
-/// The view of a scene in which widths of points and lines count their pixels: the first one that is drawn.
-using FirstView = std::function<View(const Scene&)>;
+/// The views of a scene whose pixels widths of points and lines count: those of all screens in the first frame.
+using FirstViews = std::function<std::vector<View>(const Scene&)>;
 /// That of a picture by the camera that the settings choose.
-[[nodiscard]] FirstView first_view(const RenderSettings& settings, Size size = kDefaultPictureSize);
+[[nodiscard]] FirstViews first_view(const RenderSettings& settings, Size size = kDefaultPictureSize);
 
 /// Loads a scene, lights it and shapes its points and lines as the settings say. `pictures`: how large an environment
 /// may be. Throws Error as load_scene, choose_camera and load_environment do, and BadInput for values that are not
 /// finite where the settings are strict.
 [[nodiscard]] LoadedScene load_scene(const std::string& source, const RenderSettings& settings,
-                                     const SceneLimits& limits, const ImageLimits& pictures, const FirstView& view);
+                                     const SceneLimits& limits, const ImageLimits& pictures, const FirstViews& views);
 
 /// Throws Error (Usage) where the settings leave no surface for every pixel of a file of keys.
 void check_raw(const RenderSettings& settings);

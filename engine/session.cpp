@@ -27,6 +27,7 @@
 #include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/refined_triangles.h"
+#include "scene/pages/part_pages.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -37,14 +38,22 @@ namespace {
 void find_whole(Communicator& comm, Scene& scene) {
   if (scene.parts.empty()) return;
   SceneFraming framing(scene.bounds);
-  for (const Instance& instance : scene.instances) framing.add(instance, scene.mesh_of(instance));
+  std::vector<RefinementCount> mine;  // of one of those who hold the part
+  const auto add = [&](std::span<const SurfaceRange> surfaces) {
+    for (const Instance& instance : scene.instances) framing.add(instance, scene.mesh_of(instance));
+    if (static_cast<std::size_t>(comm.rank()) >= scene.parts.size()) return;
+    const std::vector<RefinementCount> counts = count_refined_parts(scene, RaySpace(scene), surfaces);
+    mine.insert(mine.end(), counts.begin(), counts.end());
+  };
+  agree_on_failure(comm, [&] {
+    if (!scene.part_pages) add(scene.parts.at(static_cast<std::size_t>(comm.rank()) % scene.parts.size()));
+    for (std::size_t page = 0; scene.part_pages && page < scene.part_pages->size(); ++page) {
+      const PageInUse use(scene, page);
+      add(surfaces_of_page(scene, page));
+    }
+  });
   for (const SceneFraming::Extremes& of_rank : all_gather_value(comm, framing.extremes())) framing.add(of_rank);
   scene.framing = framing.camera();
-  const std::vector<SurfaceRange>& part = scene.parts.at(static_cast<std::size_t>(comm.rank()) % scene.parts.size());
-  std::vector<RefinementCount> mine;  // of one of those who hold the part
-  if (static_cast<std::size_t>(comm.rank()) < scene.parts.size()) {
-    mine = count_refined_parts(scene, RaySpace(scene.bounds), part);
-  }
   std::vector<RefinementCount> all;
   for (const auto& of_rank : all_gather_lists(comm, std::span(std::as_const(mine)))) {
     all.insert(all.end(), of_rank.begin(), of_rank.end());
@@ -106,6 +115,10 @@ RasterSpeed Session::measure_raster() {
 
 std::string Session::gl_description() const {
   return gl_ ? gl_->description() : "not started, as nothing was drawn by it";
+}
+
+std::string Session::gpu() const {
+  return gl_ && !gl_->software() ? host_.host + ": " + gl_->description() : "";
 }
 
 Session::HostResources Session::find_host_resources(Communicator& comm, int threads) {
@@ -219,18 +232,49 @@ void Session::partition_rays(const RaySettings& settings) {
   if (settings.part == part_ && settings.holders == holders_) return;
   release_rays();
   forwarding_.reset();
-  part_ = settings.part;
+  part_.reset();  // where what follows fails, it is tried again
   holders_ = settings.holders;
-  if (part_) forwarding_ = std::make_unique<RayForwarding>(holders, scene_, RaySpace(scene_.bounds), *part_);
+  if (!settings.part) return;
+  forwarding_ = scene_.part_pages ? std::make_unique<RayForwarding>(holders, scene_, RaySpace(scene_))
+                                  : std::make_unique<RayForwarding>(holders, scene_, RaySpace(scene_), *settings.part);
+  part_ = settings.part;
 }
 
 std::unique_ptr<RayScene> Session::build_ray_scene(std::span<const SurfaceRange> objects) const {
   const trace::Span span("build ray scene");
-  return std::make_unique<RayScene>(scene_, RaySpace(scene_.bounds), host_.threads, objects, ray_build_);
+  return std::make_unique<RayScene>(scene_, RaySpace(scene_), host_.threads, objects, ray_build_);
+}
+
+void Session::draw_pages(std::span<const SurfaceRange> objects,
+                         const std::function<void(std::span<const SurfaceRange>)>& draw) {
+  if (!scene_.part_pages) return draw(objects);
+  const auto forget_page = [this] {  // its memory goes before the next frame
+    page_.reset();
+    rasterizer_.reset();
+    primary_rays_.reset();
+  };
+  forget_page();  // of a frame that failed
+  for (const std::size_t page : scene_.part_pages->nearest_first()) {
+    const PageInUse use(scene_, page);
+    page_ = page;
+    const std::span<const SurfaceRange> surfaces = surfaces_of_page(scene_, page);
+    draw(common_ranges(merged_ranges({objects.begin(), objects.end()}, scene_.triangles),
+                       merged_ranges({surfaces.begin(), surfaces.end()}, scene_.triangles)));
+  }
+  forget_page();
+}
+
+/// The primary rays through what a page has of the scene that light meets.
+PrimaryRays& Session::primary_rays_of_page() {
+  HPR_CHECK(page_);
+  primary_rays_ =
+      std::make_unique<PrimaryRays>(scene_, ray_scene(ray_build_).of_page(*page_, host_.threads), host_.threads);
+  return *primary_rays_;
 }
 
 PrimaryRays& Session::primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings) {
   partition_rays(settings);
+  if (scene_.part_pages) return primary_rays_of_page();
   if (!primary_rays_ || !std::ranges::equal(objects, traced_objects_)) {
     primary_rays_.reset();
     traced_part_.reset();  // frees its memory before the next one takes some
@@ -266,15 +310,14 @@ PrimaryRays& Session::whole_primary_rays(const RaySettings& settings) {
 
 /// Of the surfaces that cover what is behind them, those that rays meet at home.
 std::vector<SurfaceRange> Session::covering_part() const {
-  std::vector<SurfaceRange> covering = covering_surfaces(scene_, false);
-  return part_ ? common_ranges(merged_ranges(*part_, scene_.triangles), covering) : covering;
+  return surfaces_at_home(scene_, part_, covering_surfaces(scene_, false));
 }
 
 const RayScene& Session::ray_scene(const RayBuild& build) {
   build_rays_by(build);
   if (!ray_scene_) {
     ray_scene_ = build_ray_scene(covering_part());
-    if (forwarding_) ray_scene_->share(*forwarding_);
+    if (forwarding_) ray_scene_->share(*forwarding_, covering_surfaces(scene_, false), ray_build_);
   }
   return *ray_scene_;
 }
@@ -333,7 +376,7 @@ TileLayer<Key>& Session::keys(const FrameLayout& layout, const std::string& stra
     fits = std::ranges::all_of(all_gather_value(comm_, fits ? 1 : 0), [](int of_rank) { return of_rank == 1; });
   }
   if (fits && layout.tiles() > 0) {
-    keys_.clear();
+    parallel_for(threads(), keys_.tiles(), [&](std::size_t tile) { keys_.clear(tile); });
     return keys_;
   }
   keys_ = {};  // before as much is taken again
@@ -348,7 +391,8 @@ std::span<TileLayer<Key>> Session::round_keys(const FrameLayout& layout, std::si
   while (round_keys_.size() < count) round_keys_.emplace_back(layout);
   while (round_keys_.size() > std::max<std::size_t>(count, 2)) round_keys_.pop_back();
   const std::span<TileLayer<Key>> layers = std::span(round_keys_).first(count);
-  parallel_for(threads(), layers.size(), [&](std::size_t i) { layers[i].clear(); });
+  parallel_for(threads(), layers.size() * layout.tiles(),
+               [&](std::size_t i) { layers[i / layout.tiles()].clear(i % layout.tiles()); });
   return layers;
 }
 

@@ -51,6 +51,11 @@ class Session {
   /// Collective. Changes the scene, alike on every rank. What was made of the old scene is made again when it is
   /// needed.
   void change_scene(const std::function<void(Scene&)>& change);
+  /// Collective, before a frame: gives back the memory of textures that were not used for long, where they may come
+  /// again and are more than a host may hold.
+  void forget_unused_texels() {
+    if (scene_.texel_store) scene_.texel_store->forget_unused();
+  }
 
   [[nodiscard]] CountingCommunicator& comm() { return comm_; }
   [[nodiscard]] int rank() const { return comm_.rank(); }
@@ -59,6 +64,8 @@ class Session {
   [[nodiscard]] const Requirements& requirements() const { return requirements_; }
   [[nodiscard]] int threads() const { return host_.threads; }
   [[nodiscard]] const std::string& host() const { return host_.host; }
+  /// The ranks of this host.
+  [[nodiscard]] int host_ranks() const { return host_.ranks; }
   /// Collective. Starts OpenGL where it does not run yet, which costs more than a small picture by rays. Compares the
   /// ranks' rasterisers and names those that differ. Throws Error (NoDevice) on all ranks where one has no OpenGL.
   void start_gl();
@@ -68,6 +75,8 @@ class Session {
   [[nodiscard]] RasterSpeed measure_raster();
   /// Renderer, version and device of OpenGL, for people.
   [[nodiscard]] std::string gl_description() const;
+  /// The GPU that OpenGL draws by on this rank, with its host; empty: none does.
+  [[nodiscard]] std::string gpu() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }
   /// What composites where groups follow the view.
   [[nodiscard]] TileGather& tile_gather() { return *tile_gather_; }
@@ -76,6 +85,10 @@ class Session {
 
   /// The chunks of the scene's surfaces that have keys; made when first asked for, kept until the scene changes.
   [[nodiscard]] const SceneChunks& scene_chunks();
+  /// Calls `draw` with `objects`; where this rank's part of the scene is in pages, once for each page with those of
+  /// them that it has, while the scene has their triangles. What travelling rays need is made before (partition_rays).
+  void draw_pages(std::span<const SurfaceRange> objects,
+                  const std::function<void(std::span<const SurfaceRange>)>& draw);
   /// The rasteriser that holds `objects`; kept until other objects are asked for. After start_gl().
   [[nodiscard]] Rasterizer& rasterizer(std::span<const SurfaceRange> objects);
   /// One for triangles that other ranks send, of this session's scene; holds none before they are loaded.
@@ -120,6 +133,7 @@ class Session {
   void build_rays_by(const RayBuild& build);
   void release_rays();
   [[nodiscard]] std::vector<SurfaceRange> covering_part() const;
+  [[nodiscard]] PrimaryRays& primary_rays_of_page();
   [[nodiscard]] std::unique_ptr<RayScene> build_ray_scene(std::span<const SurfaceRange> objects) const;
   [[nodiscard]] TileLayer<Key> shared_layer(const FrameLayout& layout, const std::string& strategy,
                                             std::span<const int> members);
@@ -153,6 +167,7 @@ class Session {
   std::vector<int> holders_;                       ///< see RaySettings::holders
   std::unique_ptr<RayForwarding> forwarding_;      ///< where there is a part
   std::unique_ptr<RayScene> ray_scene_;
+  std::optional<std::size_t> page_;  ///< whose triangles the scene has
   std::vector<SurfaceRange> traced_objects_;
   std::unique_ptr<RayScene> traced_part_;  ///< of primary_rays_; none where ray_scene_ is
   std::unique_ptr<PrimaryRays> primary_rays_;

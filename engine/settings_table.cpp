@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <utility>
 
 #include "compositing/compositor.h"
@@ -55,7 +54,6 @@ SettingValue point(std::optional<glm::dvec3> CameraChoice::*which) {
 }
 
 constexpr std::array<std::string_view, 2> kOffOn{"off", "on"};
-constexpr std::array<std::string_view, 2> kDataNames{"replicated", "partitioned"};
 
 /// Throws Error (Usage) for what is no list of passes.
 void parse_passes(Settings& settings, const std::string& list) {
@@ -79,9 +77,10 @@ void parse_passes(Settings& settings, const std::string& list) {
 }
 
 SettingValue passes() {
+  std::vector<std::string_view> names;
+  for (const PassInfo& pass : all_passes()) names.push_back(pass.name);
   return {.type = "LIST",
-          .takes = fmt::format("auto, all, none, or a list of {}",
-                               fmt::join(all_passes() | std::views::transform(&PassInfo::name), ", ")),
+          .takes = fmt::format("auto, all, none, or a list of {}", fmt::join(names, ", ")),
           .parse = parse_passes,
           .write =
               [](const Settings& settings) {
@@ -232,7 +231,7 @@ std::vector<Setting> make_table() {
        .decides_bits = false,
        .fixed_in_session = true},
       {.name = "point-size",
-       .help = "diameter of the scene's points: pixels where they stand in the first view, or metres; 0: none",
+       .help = "diameter of the scene's points: pixels where they stand in the first frame, or metres; 0: none",
        .value = drawn_width(&PointLineWidths::points),
        .initial = "3px",
        .decides_bits = false,
@@ -431,10 +430,13 @@ std::vector<Setting> make_table() {
        .used_with = {{"show", shows_light}}},
       {.name = "data",
        .help = "what a rank holds of the scene: replicated, all of it, or partitioned, what the rank draws itself, "
-               "while the rays of the others come to it",
-       .value = choice(kDataNames, [](Settings& s) -> bool& { return s.frame.partitioned; }),
+               "while the rays of the others come to it, or paged, the same with what --limit-mem has no room for on "
+               "the disk",
+       .value = choice(kDataNames, [](Settings& s) -> SceneData& { return s.frame.data; }),
        .initial = "replicated",
-       .costs = "partitioned: time and messages, as rays travel; replicated: the memory of a whole scene on each rank",
+       .costs = "partitioned: time and messages, as rays travel; paged: time, as pages come and go; replicated: the "
+                "memory of "
+                "a whole scene on each rank",
        .loses = "nothing: no bit of a picture",
        .decides_bits = false},
       {.name = "no-terminator-fix",
@@ -514,8 +516,8 @@ std::vector<Setting> make_table() {
        .value = text(
            "LIST", "layers", [](Settings& s) -> std::vector<Aov>& { return s.frame.aovs; }, parse_aovs,
            [](const std::vector<Aov>& aovs) {
-             std::vector<std::string_view> names;
-             for (const Aov aov : aovs) names.push_back(name_of(aov));
+             std::vector<std::string_view> names(aovs.size());
+             std::ranges::transform(aovs, names.begin(), [](Aov aov) { return name_of(aov); });
              return fmt::format("{}", fmt::join(names, ","));
            }),
        .scope = SettingScope::Single},

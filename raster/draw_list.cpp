@@ -284,4 +284,41 @@ DrawList make_draw_list(const Scene& scene, const Geometry& geometry, std::span<
   return list;
 }
 
+std::vector<DrawList> split_list(DrawList list, std::size_t count) {
+  const std::uint64_t triangles = list.triangles_drawn;
+  count = std::min<std::size_t>(count, triangles);
+  std::vector<DrawList> lists;
+  if (count <= 1) {
+    lists.push_back(std::move(list));
+    return lists;
+  }
+  lists.resize(count);
+  std::uint64_t done = 0;
+  for (const DrawSpan& span : list.spans) {
+    for (std::size_t i = span.first; i < span.first + span.count; ++i) {
+      DrawCommand rest = list.commands[i];
+      while (rest.count > 0) {
+        const std::uint64_t number = done * count / triangles;  // of the list that the next triangle is in
+        const std::uint64_t end = ((number + 1) * triangles + count - 1) / count;
+        DrawList& part = lists[number];
+        DrawCommand command = rest;
+        command.count = static_cast<std::uint32_t>(std::min<std::uint64_t>(rest.count, 3 * (end - done)));
+        command.base_instance = static_cast<std::uint32_t>(part.records.size());
+        part.commands.push_back(command);
+        part.records.push_back(list.records[rest.base_instance]);
+        append_span(part, span.winding);
+        done += command.count / 3;
+        rest.first_index += command.count;
+        rest.count -= command.count;
+      }
+    }
+  }
+  for (DrawList& part : lists) part.pixels = list.pixels;
+  lists.front().triangles_drawn = list.triangles_drawn;
+  lists.front().triangles_culled = list.triangles_culled;
+  lists.front().chunks_drawn = list.chunks_drawn;
+  lists.front().chunks_culled = list.chunks_culled;
+  return lists;
+}
+
 }  // namespace hpr

@@ -107,4 +107,8 @@ enum class Culling {
                                       const View& view, const Rect& part, Culling culling, int threads,
                                       const std::vector<SurfaceRange>* only = nullptr);
 
+/// Splits a list into at most `count` lists of as many triangles each, but for one, none of them empty; commands are
+/// cut where need be. Their keys, merged by maximum, are those of the list. What is counted stays with the first.
+[[nodiscard]] std::vector<DrawList> split_list(DrawList list, std::size_t count);
+
 }  // namespace hpr

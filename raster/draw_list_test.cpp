@@ -143,6 +143,55 @@ TEST(DrawList, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
+/// Surfaces, per command its triangles: [first, last) of an index buffer and the instance they belong to.
+std::vector<std::array<std::uint32_t, 3>> triangles_of(const DrawList& list) {
+  std::vector<std::array<std::uint32_t, 3>> all;
+  for (const DrawSpan& span : list.spans) {
+    for (std::size_t i = span.first; i < span.first + span.count; ++i) {
+      const DrawCommand& command = list.commands[i];
+      EXPECT_EQ(command.count % 3, 0U);
+      for (std::uint32_t index = 0; index < command.count; index += 3) {
+        all.push_back({command.first_index + index, list.records[command.base_instance].first_surface,
+                       static_cast<std::uint32_t>(span.winding)});
+      }
+    }
+  }
+  return all;
+}
+
+TEST(DrawList, PartsHaveEveryTriangleOnceAndAsMany) {
+  Scene scene;
+  scene.meshes = {test::waves(20), test::waves(60)};
+  scene.materials.resize(1);
+  scene.materials[0].double_sided = false;
+  scene.instances = {test::placed(0, {0.0, 0.0, 0.0}), test::placed(1, {0.0, 0.0, -1.0}),
+                     test::placed(0, {0.5, 0.0, -1.0})};
+  scene.instances[1].to_world[0] *= -1.0;  // drawn by the other winding
+  finish_scene(scene);
+  const Geometry geometry = collect_geometry(scene, std::array{test::all_of(scene)});
+  const View view = test::perspective_view({100, 100}, {0.0, 0.0, 8.0});
+  const DrawList list = make_draw_list(scene, geometry, geometry.pieces, view, view.block, Culling::Chunks, 1);
+  const auto expected = triangles_of(list);
+  ASSERT_EQ(expected.size(), 8800U);
+  for (const std::size_t count : {0U, 1U, 2U, 3U, 7U, 16U, 8799U, 8800U, 10000U}) {
+    const std::vector<DrawList> parts = split_list(list, count);
+    ASSERT_EQ(parts.size(), std::clamp<std::size_t>(count, 1, 8800)) << count;
+    std::vector<std::array<std::uint32_t, 3>> all;
+    std::uint64_t drawn = 0;
+    for (const DrawList& part : parts) {
+      const auto own = triangles_of(part);
+      EXPECT_GE(own.size(), 8800 / parts.size());
+      EXPECT_LE(own.size(), 8800 / parts.size() + 1);
+      EXPECT_EQ(part.pixels, list.pixels);
+      all.insert(all.end(), own.begin(), own.end());
+      drawn += part.triangles_drawn;
+    }
+    EXPECT_TRUE(all == expected) << count;
+    EXPECT_EQ(drawn, list.triangles_drawn);
+  }
+  EXPECT_EQ(split_list({}, 4).size(), 1U);
+}
+
 }  // namespace
 
 }  // namespace hpr

@@ -26,7 +26,7 @@ class EglContext final : public GlContext {
   EglContext& operator=(const EglContext&) = delete;
   // The display is shared by all contexts of the process and has no reference count: it is never terminated.
   ~EglContext() override {
-    if (eglGetCurrentContext() == context_) release_egl();
+    EglContext::release();
     eglDestroyContext(display_, context_);
   }
 
@@ -54,6 +54,10 @@ class EglContext final : public GlContext {
                   fmt::format("EGL cannot make its context current (error 0x{:x}), {}", eglGetError(), device_));
     }
   }
+  void release() override {
+    if (eglGetCurrentContext() == context_) release_egl();
+  }
+  [[nodiscard]] std::unique_ptr<GlContext> share() override;
 
  private:
   EGLDisplay display_;
@@ -62,6 +66,23 @@ class EglContext final : public GlContext {
   GlFunctions gl_;
   GlInfo info_;
 };
+
+/// EGL_NO_CONTEXT where there is none. `shared`: whose buffers it has too.
+EGLContext create_context(EGLDisplay display, EGLContext shared) {
+  constexpr std::array<EGLint, 7> kAttributes{
+      EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+  return eglCreateContext(display, EGL_NO_CONFIG_KHR, shared, kAttributes.data());
+}
+
+std::unique_ptr<GlContext> EglContext::share() {
+  auto* const context = create_context(display_, context_);
+  if (context == EGL_NO_CONTEXT) return nullptr;
+  auto made = std::make_unique<EglContext>(display_, context, device_);
+  made->gl_ = gl_;  // functions of one vendor serve all its contexts
+  made->info_ = info_;
+  return made;
+}
 
 /// The words of a space-separated list of extensions.
 bool has_extension(const char* extensions, std::string_view wanted) {
@@ -160,10 +181,7 @@ std::unique_ptr<GlContext> try_attempt(const Attempt& attempt) {
     throw fail("no contexts without a config");
   }
   if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) throw fail("no desktop OpenGL");
-  constexpr std::array<EGLint, 7> kAttributes{
-      EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-  auto* const context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kAttributes.data());
+  auto* const context = create_context(display, EGL_NO_CONTEXT);
   if (context == EGL_NO_CONTEXT) throw fail("no OpenGL 4.5 core context");
   auto made = std::make_unique<EglContext>(display, context, attempt.what);
   made->load();

@@ -26,6 +26,11 @@ class GlContext {
   [[nodiscard]] virtual bool software() const = 0;
   /// Makes this the calling thread's context and releases another backend's; cheap when it already is.
   virtual void make_current() = 0;
+  /// Releases it where it is the calling thread's, so that another thread may make it current.
+  virtual void release() = 0;
+  /// Another context that has this one's buffers and programs too, for use by another thread; current on none. Null
+  /// where the backend has none. Neither needs the other to outlive it.
+  [[nodiscard]] virtual std::unique_ptr<GlContext> share() { return nullptr; }
   /// The functions of this context; call them only while it is current.
   [[nodiscard]] virtual const GlFunctions& gl() const = 0;
 };

@@ -103,28 +103,30 @@ void KeyTarget::read(Size view, const Rect& pixels) {
   gl.ReadPixels(pixels.x0, y, pixels.width(), pixels.height(), GL_RED_INTEGER, GL_UNSIGNED_INT, words_.data());
 }
 
-void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> words, const Rect& pixels,
-               std::size_t screen, TileLayer<Key>& layer, int threads) {
+void pack_keys(std::span<const KeyHalves> drawn, const Rect& pixels, std::size_t screen, TileLayer<Key>& layer,
+               int threads) {
   if (pixels.empty()) return;
-  HPR_CHECK(depths.size() >= pixels.area() && words.size() >= pixels.area());
-  const Rows rows{depths.data(), words.data(), pixels};
+  for (const KeyHalves& halves : drawn) {
+    HPR_CHECK(halves.depths.size() >= pixels.area() && halves.words.size() >= pixels.area());
+  }
   const int first_column = pixels.x0 / kTileSide;
   const int first_row = pixels.y0 / kTileSide;
-  const int last_column = (pixels.x1 - 1) / kTileSide;
-  const int tile_rows = (pixels.y1 - 1) / kTileSide - first_row + 1;
+  const int columns = (pixels.x1 - 1) / kTileSide - first_column + 1;
+  const int rows = (pixels.y1 - 1) / kTileSide - first_row + 1;
 
-  parallel_for(threads, static_cast<std::size_t>(tile_rows), [&](std::size_t row) {
-    for (int column = first_column; column <= last_column; ++column) {
-      const int x0 = column * kTileSide;
-      const int y0 = (first_row + static_cast<int>(row)) * kTileSide;
-      const Rect rect = intersection(pixels, {x0, y0, x0 + kTileSide, y0 + kTileSide});
-      if (!any_drawn(rows, rect)) continue;
-      const std::size_t tile = layer.layout().tile_at(screen, x0, y0);
-      Key* const keys = layer.tile(tile).data();
+  parallel_for(threads, static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns), [&](std::size_t i) {
+    const int x0 = (first_column + static_cast<int>(i) % columns) * kTileSide;
+    const int y0 = (first_row + static_cast<int>(i) / columns) * kTileSide;
+    const Rect rect = intersection(pixels, {x0, y0, x0 + kTileSide, y0 + kTileSide});
+    const std::size_t tile = layer.layout().tile_at(screen, x0, y0);
+    Key* const keys = layer.tile(tile).data();
+    for (const KeyHalves& halves : drawn) {
+      const Rows from_rows{halves.depths.data(), halves.words.data(), pixels};
+      if (!any_drawn(from_rows, rect)) continue;
       const auto write_row = layer.active(tile) ? merge_row : store_row;
       for (int y = rect.y0; y < rect.y1; ++y) {
-        const std::size_t from = rows.index(rect.x0, y);
-        write_row(rows.depths + from, rows.words + from, static_cast<std::size_t>(rect.width()),
+        const std::size_t from = from_rows.index(rect.x0, y);
+        write_row(from_rows.depths + from, from_rows.words + from, static_cast<std::size_t>(rect.width()),
                   keys + std::ptrdiff_t{kTileSide} * (y - y0) + (rect.x0 - x0));
       }
       layer.set_active(tile);

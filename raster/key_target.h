@@ -12,6 +12,13 @@
 
 namespace hpr {
 
+/// The halves of a rectangle's keys: [height][width], the last row first, as GL reads them; 0 in both where nothing was
+/// drawn.
+struct KeyHalves {
+  std::span<const float> depths;
+  std::span<const std::uint32_t> words;
+};
+
 /// What GL draws keys into: 32-bit float depth and 32-bit unsigned words (the low halves of keys), both 0 where nothing
 /// is drawn. Grows to what is needed and stays.
 class KeyTarget {
@@ -23,10 +30,9 @@ class KeyTarget {
   /// viewports and sub-frusta do. The framebuffer ends at the part's far corner.
   void begin(Size view, const Rect& part);
 
-  /// Reads `pixels` of the view into depths() and words(); rows from the bottom up, as GL has them.
+  /// Reads `pixels` of the view into halves(); rows from the bottom up, as GL has them.
   void read(Size view, const Rect& pixels);
-  [[nodiscard]] const std::vector<float>& depths() const { return depths_; }
-  [[nodiscard]] const std::vector<std::uint32_t>& words() const { return words_; }
+  [[nodiscard]] KeyHalves halves() const { return {depths_, words_}; }
 
  private:
   void grow(Size needed);
@@ -40,10 +46,9 @@ class KeyTarget {
   std::vector<std::uint32_t> words_;
 };
 
-/// Merges (maximum) the keys of a rectangle into the tiles of `screen` and marks those tiles active where anything was
-/// drawn. `depths` and `words` (the keys' halves) are [height][width] of `pixels`, the last row first, as GL reads
-/// them; 0 in both where nothing was drawn.
-void pack_keys(std::span<const float> depths, std::span<const std::uint32_t> words, const Rect& pixels,
-               std::size_t screen, TileLayer<Key>& layer, int threads);
+/// Merges (maximum) the keys of the rectangle `pixels`, once or several times drawn, into the tiles of `screen`, and
+/// marks those tiles active where anything was drawn.
+void pack_keys(std::span<const KeyHalves> drawn, const Rect& pixels, std::size_t screen, TileLayer<Key>& layer,
+               int threads);
 
 }  // namespace hpr

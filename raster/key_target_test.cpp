@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <vector>
 
 namespace hpr {
@@ -24,7 +26,7 @@ TEST(PackKeys, PutsEveryPixelWhereItBelongs) {
       }
     }
     TileLayer<Key> layer(FrameLayout({Size{64, 64}, Size{300, 170}}));
-    pack_keys(depths, words, rect, 1, layer, 3);
+    pack_keys(std::array{KeyHalves{depths, words}}, rect, 1, layer, 3);
     for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
       const TilePlace position = layer.layout().place(tile);
       bool drawn = false;
@@ -45,20 +47,30 @@ TEST(PackKeys, KeepsTheLargerKey) {
   TileLayer<Key> layer(FrameLayout({Size{4, 1}}));
   const Rect rect{0, 0, 4, 1};
   const auto word = [](std::uint32_t surface) { return ~surface; };
-  pack_keys(std::vector{0.5F, 0.5F, 0.0F, 0.25F}, std::vector<std::uint32_t>{word(7), word(7), 0, word(1)}, rect, 0,
-            layer, 1);
-  pack_keys(std::vector{0.25F, 0.5F, 0.125F, 0.0F}, std::vector<std::uint32_t>{word(1), word(3), word(9), 0}, rect, 0,
-            layer, 1);
+  const std::vector<float> first_depths{0.5F, 0.5F, 0.0F, 0.25F};
+  const std::vector<std::uint32_t> first_words{word(7), word(7), 0, word(1)};
+  const std::vector<float> second_depths{0.25F, 0.5F, 0.125F, 0.0F};
+  const std::vector<std::uint32_t> second_words{word(1), word(3), word(9), 0};
+  const KeyHalves first{first_depths, first_words};
+  const KeyHalves second{second_depths, second_words};
+  pack_keys(std::array{first}, rect, 0, layer, 1);
+  pack_keys(std::array{second}, rect, 0, layer, 1);
   EXPECT_EQ(layer.at(0, 0, 0), make_key(0.5F, 7));
   EXPECT_EQ(layer.at(0, 1, 0), make_key(0.5F, 3));
   EXPECT_EQ(layer.at(0, 2, 0), make_key(0.125F, 9));
   EXPECT_EQ(layer.at(0, 3, 0), make_key(0.25F, 1));
+
+  TileLayer<Key> at_once(layer.layout());
+  pack_keys(std::array{first, second}, rect, 0, at_once, 1);
+  EXPECT_TRUE(std::ranges::equal(at_once.tile(0), layer.tile(0)));
 }
 
 TEST(PackKeys, OfNothingLeavesTheTilesInactive) {
   TileLayer<Key> layer(FrameLayout({Size{100, 100}}));
-  pack_keys(std::vector<float>(10000, 0.0F), std::vector<std::uint32_t>(10000, 0), {0, 0, 100, 100}, 0, layer, 2);
-  pack_keys({}, {}, {5, 5, 5, 9}, 0, layer, 2);
+  const std::vector<float> depths(10000, 0.0F);
+  const std::vector<std::uint32_t> words(10000, 0);
+  pack_keys(std::array{KeyHalves{depths, words}}, {0, 0, 100, 100}, 0, layer, 2);
+  pack_keys(std::array{KeyHalves{}}, {5, 5, 5, 9}, 0, layer, 2);
   EXPECT_EQ(layer.active_tiles(), 0U);
 }
 

@@ -49,7 +49,7 @@ class OsMesaContext final : public GlContext {
   OsMesaContext(const OsMesaContext&) = delete;
   OsMesaContext& operator=(const OsMesaContext&) = delete;
   ~OsMesaContext() override {
-    if (osmesa_.current() == state_) osmesa_.make_current(nullptr, nullptr, 0, 0, 0);
+    OsMesaContext::release();
     osmesa_.destroy(state_);
   }
 
@@ -72,6 +72,9 @@ class OsMesaContext final : public GlContext {
     if (osmesa_.make_current(state_, pixels_.data(), GL_UNSIGNED_BYTE, 1, 1) != GL_TRUE) {
       throw Error(ExitCode::NoDevice, "OSMesa cannot make its context current");
     }
+  }
+  void release() override {
+    if (osmesa_.current() == state_) osmesa_.make_current(nullptr, nullptr, 0, 0, 0);
   }
 
  private:

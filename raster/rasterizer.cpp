@@ -1,70 +1,32 @@
 #include "raster/rasterizer.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "core/bytes.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/timing.h"
 #include "raster/chunk_triangles.h"
 #include "raster/geometry.h"
 #include "raster/gl.h"
-#include "raster/key_target.h"
+#include "raster/key_drawer.h"
 
 namespace hpr {
 namespace {
 
-constexpr std::string_view kVertexShader = R"(#version 450 core
-layout(location = 0) in vec3 position;
-layout(location = 1) in uint first_surface;   // per command
-layout(location = 2) in mat4 clip_from_mesh;  // per command
-layout(location = 6) in uint triangle;        // whose last corner, the provoking one, this is
-invariant gl_Position;
-flat out uint surface;
-void main() {
-  gl_Position = clip_from_mesh * vec4(position, 1.0);
-  surface = first_surface + triangle;
-}
-)";
-
-// The complement is what the low half of a key holds, so that 0 is left for "nothing".
-constexpr std::string_view kFragmentShader = R"(#version 450 core
-flat in uint surface;
-layout(location = 0) out uint word;
-void main() { word = ~surface; }
-)";
-
-// The same with depths rounded as quantized_depth does: LOST_BITS is set before it.
-constexpr std::string_view kQuantizingFragmentShader = R"(
-flat in uint surface;
-layout(location = 0) out uint word;
-void main() {
-  word = ~surface;
-  const uint half_step = (1u << LOST_BITS) >> 1;
-  gl_FragDepth = uintBitsToFloat((floatBitsToUint(gl_FragCoord.z) + half_step) >> LOST_BITS << LOST_BITS);
-}
-)";
-
-/// Which shader draws depths of a format.
-GlObject make_program_for(GlContext& context, DepthFormat format) {
-  if (format == DepthFormat::Float32) return make_program(context, kVertexShader, kFragmentShader);
-  return make_program(
-      context, kVertexShader,
-      fmt::format("#version 450 core\n#define LOST_BITS {}{}", lost_bits(format), kQuantizingFragmentShader));
-}
-
-constexpr GLuint kVertices = 0;  // vertex buffer bindings
-constexpr GLuint kRecords = 1;
-
-template <typename T>
-void upload(const GlFunctions& gl, const GlObject& buffer, const std::vector<T>& data, GLenum usage) {
-  gl.NamedBufferData(buffer.name(), static_cast<GLsizeiptr>(data.size() * sizeof(T)), data.data(), usage);
-}
+/// A software GL does all its work on triangles, but for their pixels, by one thread of a context: so many triangles,
+/// or one for so many pixels, take it about as long as a further context takes to clear, read and merge its pixels.
+constexpr std::uint64_t kTrianglesOfContext = 60'000;
+constexpr std::uint64_t kPixelsOfTriangle = 40;
+/// What the contexts of a rasteriser may take for the pixels of a frame: as drawn, and as read.
+constexpr std::size_t kMaxTargetBytes = std::size_t{512} << 20U;
+constexpr std::size_t kBytesOfPixel = 16;
 
 /// A random number in [-1, 1), equal on every machine: a 32-bit linear congruential generator (Numerical Recipes) and
 /// exact steps.
@@ -93,6 +55,18 @@ Scene fixed_scene() {
   return scene;
 }
 
+/// Leaves a context to other threads at its end.
+class ReleaseAtEnd {
+ public:
+  explicit ReleaseAtEnd(GlContext& context) : context_(context) {}
+  ~ReleaseAtEnd() { context_.release(); }
+  ReleaseAtEnd(const ReleaseAtEnd&) = delete;
+  ReleaseAtEnd& operator=(const ReleaseAtEnd&) = delete;
+
+ private:
+  GlContext& context_;
+};
+
 }  // namespace
 
 class Rasterizer::Implementation {
@@ -103,14 +77,9 @@ class Rasterizer::Implementation {
         scene_(scene),
         threads_(threads),
         culling_(culling),
-        program_(make_program_for(context, format_)),
         vertices_(make_buffer(context)),
-        indices_(make_buffer(context)),
-        records_(make_buffer(context)),
-        commands_(make_buffer(context)),
-        vertex_array_(make_vertex_array(context)),
-        target_(context) {
-    describe_vertices(context_.gl());
+        indices_(make_buffer(context)) {
+    drawers_.push_back(std::make_unique<KeyDrawer>(context, vertices_, indices_));
     load(collect_geometry(scene, objects));
   }
 
@@ -121,6 +90,8 @@ class Rasterizer::Implementation {
     upload(gl, vertices_, geometry_.vertices, GL_STATIC_DRAW);
     upload(gl, indices_, geometry_.triangles, GL_STATIC_DRAW);
     check_gl(gl, "uploading the scene");
+    if (drawers_.size() > 1) gl.Finish();  // before other contexts read them
+    for (const auto& drawer : drawers_) drawer->refresh();
     // From here on only boxes are needed of it.
     std::vector<Vertex>().swap(geometry_.vertices);  // assigning {} would keep the memory
     std::vector<glm::uvec3>().swap(geometry_.triangles);
@@ -133,16 +104,10 @@ class Rasterizer::Implementation {
     HPR_CHECK(screen < layer.layout().screens() && layer.layout().size(screen) == size);
     HPR_CHECK(view.orthographic ? view.far_distance > view.near_distance : view.near_distance > 0.0);
     stats_ = {};
-    context_.make_current();
-    if (layer.depth_format() != format_) {
-      format_ = layer.depth_format();
-      program_ = make_program_for(context_, format_);
-    }
     for (const Rect& wanted : parts) {
       const Rect part = intersection(wanted, {0, 0, size.width, size.height});
       if (!part.empty()) draw_part(view, screen, part, pieces, layer, only);
     }
-    check_gl(context_.gl(), "drawing");
   }
 
   [[nodiscard]] ChunkBins bin(const View& view, const ChunkRange& chunks,
@@ -163,54 +128,27 @@ class Rasterizer::Implementation {
     return context;
   }
 
-  void describe_vertices(const GlFunctions& gl) {
-    const GLuint array = vertex_array_.name();
-    gl.VertexArrayElementBuffer(array, indices_.name());
-    gl.VertexArrayVertexBuffer(array, kVertices, vertices_.name(), 0, sizeof(Vertex));
-    gl.VertexArrayVertexBuffer(array, kRecords, records_.name(), 0, sizeof(DrawRecord));
-    gl.VertexArrayBindingDivisor(array, kRecords, 1);
-    gl.VertexArrayAttribFormat(array, 0, 3, GL_FLOAT, GL_FALSE, 0);
-    gl.VertexArrayAttribIFormat(array, 1, 1, GL_UNSIGNED_INT, offsetof(DrawRecord, first_surface));
-    for (GLuint column = 0; column < 4; ++column) {
-      gl.VertexArrayAttribFormat(array, 2 + column, 4, GL_FLOAT, GL_FALSE, column * 4 * GLuint{sizeof(float)});
-    }
-    gl.VertexArrayAttribIFormat(array, 6, 1, GL_UNSIGNED_INT, offsetof(Vertex, triangle));
-    for (GLuint attribute = 0; attribute < 7; ++attribute) {
-      gl.EnableVertexArrayAttrib(array, attribute);
-      gl.VertexArrayAttribBinding(array, attribute, attribute == 0 || attribute == 6 ? kVertices : kRecords);
-    }
+  /// How many contexts draw a list, at most.
+  [[nodiscard]] std::size_t contexts_for(const View& view, const DrawList& list) const {
+    if (!context_.software()) return 1;
+    const std::uint64_t pixels = list.pixels.area();
+    const std::uint64_t worth = list.triangles_drawn / std::max(kTrianglesOfContext, pixels / kPixelsOfTriangle);
+    const std::size_t fit = kMaxTargetBytes / (kBytesOfPixel * view.size().area());
+    return std::clamp<std::size_t>(std::min<std::uint64_t>(worth, fit), 1,
+                                   static_cast<std::size_t>(std::max(threads_, 1)));
   }
 
-  /// Everything that others who use the context may have changed.
-  void set_state(const GlFunctions& gl) const {
-    constexpr std::array<GLenum, 8> kOff{GL_BLEND,  GL_STENCIL_TEST,       GL_POLYGON_OFFSET_FILL, GL_DEPTH_CLAMP,
-                                         GL_DITHER, GL_RASTERIZER_DISCARD, GL_PRIMITIVE_RESTART,   GL_COLOR_LOGIC_OP};
-    for (const GLenum off : kOff) {
-      gl.Disable(off);
+  /// So many drawers, or as many as there are contexts.
+  [[nodiscard]] std::size_t add_drawers(std::size_t count) {
+    while (drawers_.size() < count) {
+      std::unique_ptr<GlContext> context = context_.share();
+      if (!context) break;
+      context->make_current();
+      const ReleaseAtEnd at_end(*context);
+      drawers_.push_back(std::make_unique<KeyDrawer>(*context, vertices_, indices_));
+      shared_.push_back(std::move(context));
     }
-    gl.CullFace(GL_BACK);
-    gl.PolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-    gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    gl.DepthRangef(0.0F, 1.0F);
-    gl.Enable(GL_DEPTH_TEST);
-    // Strictly: at equal depth the surface drawn first stays, which is the one with the lower id.
-    gl.DepthFunc(GL_GREATER);
-    gl.UseProgram(program_.name());
-    gl.BindVertexArray(vertex_array_.name());
-    gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
-  }
-
-  /// One after the other, as surfaces of equal depth are told apart by their order.
-  static void draw_span(const GlFunctions& gl, const DrawSpan& span) {
-    if (span.winding == Winding::Any) {
-      gl.Disable(GL_CULL_FACE);
-    } else {
-      gl.Enable(GL_CULL_FACE);
-      gl.FrontFace(span.winding == Winding::Clockwise ? GL_CW : GL_CCW);
-    }
-    gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
-                                 reinterpret_cast<const void*>(span.first * sizeof(DrawCommand)),
-                                 static_cast<GLsizei>(span.count), sizeof(DrawCommand));
+    return std::min(count, drawers_.size());
   }
 
   void draw_part(const View& view, std::size_t screen, const Rect& part, std::span<const Piece> pieces,
@@ -220,7 +158,7 @@ class Rasterizer::Implementation {
       ms += watch.ms();
       watch.restart();
     };
-    const DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, culling_, threads_, only);
+    DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, culling_, threads_, only);
     stats_.triangles_drawn += list.triangles_drawn;
     stats_.triangles_culled += list.triangles_culled;
     stats_.chunks_drawn += list.chunks_drawn;
@@ -228,18 +166,30 @@ class Rasterizer::Implementation {
     lap(stats_.cull_ms);
     if (list.commands.empty() || list.pixels.empty()) return;
 
-    const GlFunctions& gl = context_.gl();
-    target_.begin(view.size(), list.pixels);
-    set_state(gl);
-    upload(gl, records_, list.records, GL_STREAM_DRAW);
-    upload(gl, commands_, list.commands, GL_STREAM_DRAW);
-    for (const DrawSpan& span : list.spans) draw_span(gl, span);
-    gl.Finish();
-    lap(stats_.draw_ms);
-    target_.read(view.size(), list.pixels);
-    stats_.pixels_read += list.pixels.area();
-    lap(stats_.read_ms);
-    pack_keys(target_.depths(), target_.words(), list.pixels, screen, layer, threads_);
+    const std::size_t contexts = add_drawers(contexts_for(view, list));
+    const std::vector<DrawList> lists = split_list(std::move(list), contexts);
+    context_.release();
+    std::vector<double> draw_ms(lists.size());
+    parallel_for(static_cast<int>(lists.size()), lists.size(), [&](std::size_t i) {
+      const Stopwatch drawing;
+      KeyDrawer& drawer = *drawers_[i];
+      const ReleaseAtEnd at_end(drawer.context());
+      drawer.begin(layer.depth_format());
+      drawer.draw(view, lists[i]);
+      draw_ms[i] = drawing.ms();
+      drawer.read(view, lists[i]);
+      check_gl(drawer.context().gl(), "drawing");
+    });
+    const double slowest_ms = std::ranges::max(draw_ms);
+    stats_.draw_ms += slowest_ms;
+    stats_.read_ms += watch.ms() - slowest_ms;
+    watch.restart();
+    std::vector<KeyHalves> drawn;
+    drawn.reserve(lists.size());
+    for (std::size_t i = 0; i < lists.size(); ++i) drawn.push_back(drawers_[i]->target().halves());
+    const Rect& pixels = lists.front().pixels;
+    stats_.pixels_read += lists.size() * pixels.area();
+    pack_keys(drawn, pixels, screen, layer, threads_);
     lap(stats_.pack_ms);
   }
 
@@ -248,14 +198,10 @@ class Rasterizer::Implementation {
   int threads_;
   Culling culling_;
   Geometry geometry_;
-  DepthFormat format_ = DepthFormat::Float32;
-  GlObject program_;
   GlObject vertices_;
   GlObject indices_;
-  GlObject records_;
-  GlObject commands_;
-  GlObject vertex_array_;
-  KeyTarget target_;
+  std::vector<std::unique_ptr<GlContext>> shared_;   ///< with those buffers; made when they are first needed
+  std::vector<std::unique_ptr<KeyDrawer>> drawers_;  ///< the first of context_, then of shared_
   RasterStats stats_;
 };
 

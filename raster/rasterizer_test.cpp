@@ -237,6 +237,56 @@ TEST_P(RasterizerTest, RepeatedDrawsAndThreadsGiveTheSameKeys) {
   }
 }
 
+/// Of 240 000 triangles, more than one context draws where there are threads; half of them lie in the other half.
+Scene large_scene() {
+  Scene scene;
+  scene.meshes = {waves(200), soup(3000, 7)};
+  scene.instances = {placed(0, {0.0, 0.0, 0.0}, 0.4, 1.5), placed(1, {0.0, 0.0, 0.0}),
+                     placed(0, {0.0, 0.0, 0.0}, 0.4, 1.5), placed(0, {0.5, 0.0, 0.5}, 1.0)};
+  scene.instances[3].to_world[0] *= -1.0;
+  finish_scene(scene);
+  return scene;
+}
+
+TEST_P(RasterizerTest, AnyNumberOfContextsGivesTheSameKeys) {
+  const Scene scene = large_scene();
+  const View view = perspective_view({300, 200});
+  for (const DepthFormat format : {DepthFormat::Float32, DepthFormat::Bits16}) {
+    TileLayer<Key> expected(FrameLayout({view.size()}));
+    expected.set_depth_format(format);
+    Rasterizer alone(*context_, scene, std::array{all_of(scene)}, 1);
+    alone.draw(view, 0, std::array{view.block}, expected);
+    EXPECT_GT(covered(to_image(expected, 0)), 30000U);
+    for (const int threads : {2, 7, 16}) {
+      TileLayer<Key> layer(FrameLayout({view.size()}));
+      layer.set_depth_format(format);
+      Rasterizer rasterizer(*context_, scene, std::array{all_of(scene)}, threads);
+      for (int i = 0; i < 2; ++i) {
+        rasterizer.draw(view, 0, std::array{view.block}, layer);
+        EXPECT_TRUE(to_image(expected, 0) == to_image(layer, 0)) << threads;
+        layer.clear();
+      }
+      if (context_->software() && GetParam() == "egl") {
+        EXPECT_GT(rasterizer.stats().pixels_read, alone.stats().pixels_read) << "several contexts drew";
+      }
+      EXPECT_EQ(rasterizer.stats().triangles_drawn, alone.stats().triangles_drawn);
+    }
+  }
+}
+
+TEST_P(RasterizerTest, AllContextsHaveWhatIsLoadedLater) {
+  const Scene scene = large_scene();
+  const View view = perspective_view({200, 150});
+  const std::array halves{SurfaceRange{0, scene.triangles / 3 * 2}, SurfaceRange{scene.triangles / 3, scene.triangles}};
+  Rasterizer rasterizer(*context_, scene, std::array{all_of(scene)}, 4);
+  for (const SurfaceRange& half : {halves[0], halves[1], halves[0]}) {
+    rasterizer.load(collect_geometry(scene, std::array{half}));
+    TileLayer<Key> layer(FrameLayout({view.size()}));
+    rasterizer.draw(view, 0, std::array{view.block}, layer);
+    EXPECT_TRUE(to_image(layer, 0) == draw_parts(*context_, scene, std::array{half}, view, std::array{view.block}));
+  }
+}
+
 TEST_P(RasterizerTest, ViewsOfDifferentSizesTakeTurns) {
   const Scene scene = mixed_scene();
   Rasterizer rasterizer(*context_, scene, std::array{all_of(scene)}, 1);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <iterator>
 #include <mutex>
-#include <numeric>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "core/error.h"
@@ -23,6 +23,7 @@
 #include "rt/photons/photon_tracer.h"
 #include "rt/reference/path_tracer.h"
 #include "rt/show/show_pixels.h"
+#include "rt/tile_scratch.h"
 #include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
 
@@ -61,33 +62,6 @@ ConstantEnvironment constant_environment_of(std::span<const PassPlan> plan) {
                                                          : ConstantEnvironment::Sampled;
 }
 
-/// The memory one thread needs for a tile. Kept from tile to tile: fresh pages would cost a tenth of the time.
-struct Scratch {
-  explicit Scratch(std::size_t times) : ms(times, 0.0) {}
-
-  PixelSums sums;
-  RayBuffers buffers;
-  HalfResShading shared;
-  Denoiser denoiser;
-  FragmentFinder finder;
-  std::vector<TileMargin> margins;               ///< per sample, where filters read any
-  std::vector<std::vector<PathVertex>> waiting;  ///< by depth
-  Wavefront wave;
-  std::vector<double> ms;  ///< spent on each step
-};
-
-/// What all steps took so far.
-double spent_ms(const Scratch& scratch) {
-  return std::accumulate(scratch.ms.begin(), scratch.ms.end(), 0.0);
-}
-
-/// While rays are forwarded, more threads run than there are cores, and most of them wait: scales the times of the
-/// steps to the time that was spent.
-void share_out(double spent, std::vector<double>& ms) {
-  const double sum = std::accumulate(ms.begin(), ms.end(), 0.0);
-  for (double& step : ms) step *= sum > 0.0 ? spent / sum : 0.0;
-}
-
 }  // namespace
 
 RayCounts& RayCounts::operator+=(const RayCounts& other) {
@@ -120,7 +94,8 @@ struct DeferredShader::State {
   std::optional<PhotonMapBuilder> photons;
   std::optional<PathTracer> reference;
   CoverageFragments fragments;  ///< of the pixels that denoising samples again
-  std::vector<std::unique_ptr<Scratch>> idle;
+  ScratchPool<TileScratch> tile_memory;
+  ScratchPool<WaveScratch> wave_memory;
   std::mutex mutex;
   RayCounts counts;
   double photon_ms = 0.0;   ///< spent on tracing photons, since the last gather_counts()
@@ -142,16 +117,16 @@ struct DeferredShader::State {
   void trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles);
   const PhotonMaps* photon_maps(const SampleNumber& number);
   void warn_of_cut_rays();
-  std::unique_ptr<Scratch> take_scratch();
-  void show_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+  [[nodiscard]] std::size_t steps() const { return kFirstPassStep + passes.size() + 1; }
+  void show_tile(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                  std::span<const ShadedSample> samples) const;
-  void shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index,
+  void shade_tile(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, std::size_t index,
                   std::span<const ShadedSample> samples);
   [[nodiscard]] std::size_t count_margins(const LightContext& context, const TileJob& job, bool denoises) const;
-  void start_filters(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, bool denoises,
+  void start_filters(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, bool denoises,
                      std::size_t margins);
-  void shade_margins(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, bool denoises);
-  void denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs, std::size_t index);
+  void shade_margins(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, bool denoises);
+  void denoise(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, std::size_t index);
   /// What all parts of a call of shade() share.
   struct Call {
     std::span<const ShadedSample> samples;
@@ -161,8 +136,20 @@ struct DeferredShader::State {
   [[nodiscard]] Call start_call(std::span<const ShadedSample> samples);
   void shade_part(const Call& call, const ShadedPart& part);
   void gather_counts(double spent_ms);
-  void shade_waiting(const LightContext& context, Scratch& scratch) const;
-  void shade_wavefront(const LightContext& context, Scratch& scratch) const;
+  /// Tile `index` in some samples.
+  struct TilePart {
+    std::span<const TileJob> jobs;
+    std::span<const ShadedSample> samples;
+    std::size_t index = 0;
+    bool denoises = false;
+  };
+  void shade_rows(const LightContext& context, TileScratch& scratch, WaveScratch& memory, const TilePart& part,
+                  const RowRange& rows) const;
+  void shade_points(const LightContext& context, TileScratch& scratch);
+  void shade_waves(std::size_t count, TileScratch& scratch, const std::function<void(std::size_t, WaveScratch&)>& body);
+  void shade_all_rows(const LightContext& context, TileScratch& scratch, const TilePart& part);
+  void shade_waiting(const LightContext& context, WaveScratch& memory, PixelSums& sums) const;
+  void shade_wavefront(const LightContext& context, WaveScratch& memory, PixelSums& sums) const;
 };
 
 DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
@@ -170,7 +157,7 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
     : scene(lit),
       settings(std::move(chosen)),
       plan(plan_passes(requirements, settings)),
-      space(lit.bounds),
+      space(lit),
       surfaces(lit, space, settings.show == Show::Ao || lifts_origins(plan, settings), others),
       lights(lit, constant_environment_of(plan)),
       media(lit),
@@ -196,20 +183,15 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
 
 /// Builds the ray scene of this rank's part of `objects`.
 const RayScene& DeferredShader::State::build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects) {
-  if (settings.part) objects = common_ranges(merged_ranges(*settings.part, scene.triangles), objects);
-  made.emplace(scene, space, settings.threads, objects, settings.build);
-  if (forwarding != nullptr) made->share(*forwarding);
+  made.emplace(scene, space, settings.threads, surfaces_at_home(scene, settings.part, objects), settings.build);
+  if (forwarding != nullptr) made->share(*forwarding, std::move(objects), settings.build);
   return *made;
 }
 
 void DeferredShader::State::for_each(std::size_t count, const std::function<void(std::size_t)>& body) const {
-  if (opaque != nullptr) {
-    opaque->for_each(settings.threads, count, body);
-  } else if (forwarding != nullptr) {
-    forwarding->for_each(settings.threads, count, body);
-  } else {
-    parallel_for(settings.threads, count, body);
-  }
+  if (forwarding == nullptr) return parallel_for(settings.threads, count, body);
+  const CallMemory memory = needs_light(settings.show) ? CallMemory::Large : CallMemory::Small;
+  forwarding->for_each(settings.threads, count, body, memory);
 }
 
 void DeferredShader::State::build_rays(const RaySource& source) {
@@ -276,61 +258,56 @@ void DeferredShader::State::warn_of_cut_rays() {
                counts.cut, kMaxPassed);
 }
 
-std::unique_ptr<Scratch> DeferredShader::State::take_scratch() {
-  {
-    const std::lock_guard lock(mutex);
-    if (!idle.empty()) {
-      std::unique_ptr<Scratch> scratch = std::move(idle.back());
-      idle.pop_back();
-      return scratch;
-    }
-  }
-  return std::make_unique<Scratch>(kFirstPassStep + passes.size() + 1);
-}
-
-void DeferredShader::State::shade_wavefront(const LightContext& context, Scratch& scratch) const {
-  PixelSums& sums = scratch.sums;
-  RayBuffers& buffers = scratch.buffers;
-  Wavefront& wave = scratch.wave;
+void DeferredShader::State::shade_wavefront(const LightContext& context, WaveScratch& memory, PixelSums& sums) const {
+  RayBuffers& buffers = memory.buffers;
+  Wavefront& wave = memory.wave;
   Stopwatch watch;
   const auto charge = [&](std::size_t step) {
-    scratch.ms[step] += watch.ms();
+    memory.ms[step] += watch.ms();
     watch.restart();
   };
   const auto for_each_pass = [&](const auto& body) {
     for (std::size_t i = 0; i < passes.size(); ++i) {
-      body(*passes[i].pass);
+      body(passes[i]);
       charge(kFirstPassStep + i);
     }
   };
   add_emission(context, wave, sums);
   charge(kDirectStep);
   const std::size_t depth = wave.vertices.front().depth + 1U;
-  if (scratch.waiting.size() <= depth) scratch.waiting.resize(depth + 1);
-  for_each_pass([&](const Pass& pass) { pass.scatter(context, wave, buffers, sums, scratch.waiting[depth]); });
+  if (memory.waiting.size() <= depth) memory.waiting.resize(depth + 1);
+  LobeRays followed(context, wave, buffers, sums);
+  for_each_pass([&](const RunningPass& running) { followed.add(running.info, running.pass->lobes()); });
+  followed.trace();
+  for (std::size_t i = 0; i < passes.size(); ++i) memory.ms[kFirstPassStep + i] += watch.ms() * followed.fraction(i);
+  watch.restart();
+  for_each_pass([&](const RunningPass& running) {
+    followed.finish(running.info, memory.waiting[depth]);
+    running.pass->scatter(context, wave, buffers, sums, memory.waiting[depth]);
+  });
   for (DirectLight light(context, wave); light.sample_next();) {
     charge(kDirectStep);
-    for_each_pass([&](const Pass& pass) { pass.trace_shadows(context, buffers, sums, wave); });
+    for_each_pass([&](const RunningPass& running) { running.pass->trace_shadows(context, buffers, sums, wave); });
     add_samples(wave, sums);
     charge(kDirectStep);
   }
 }
 
 /// Later generations first, so that few points wait: never more than a wave per depth, times what one splits into.
-void DeferredShader::State::shade_waiting(const LightContext& context, Scratch& scratch) const {
+void DeferredShader::State::shade_waiting(const LightContext& context, WaveScratch& memory, PixelSums& sums) const {
   while (true) {
-    const auto deepest = std::ranges::find_if(scratch.waiting.rbegin(), scratch.waiting.rend(),
+    const auto deepest = std::ranges::find_if(memory.waiting.rbegin(), memory.waiting.rend(),
                                               [](const auto& points) { return !points.empty(); });
-    if (deepest == scratch.waiting.rend()) return;
+    if (deepest == memory.waiting.rend()) return;
     if (deepest->size() <= kWavefrontVertices) {
-      scratch.wave.vertices.clear();
-      std::swap(scratch.wave.vertices, *deepest);
+      memory.wave.vertices.clear();
+      std::swap(memory.wave.vertices, *deepest);
     } else {
       const auto first = deepest->end() - static_cast<std::ptrdiff_t>(kWavefrontVertices);
-      scratch.wave.vertices.assign(first, deepest->end());
+      memory.wave.vertices.assign(first, deepest->end());
       deepest->erase(first, deepest->end());
     }
-    shade_wavefront(context, scratch);
+    shade_wavefront(context, memory, sums);
   }
 }
 
@@ -340,8 +317,8 @@ std::size_t DeferredShader::State::count_margins(const LightContext& context, co
                                                               : 0;
 }
 
-void DeferredShader::State::start_filters(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
-                                          bool denoises, std::size_t margins) {
+void DeferredShader::State::start_filters(const LightContext& context, TileScratch& scratch,
+                                          std::span<const TileJob> jobs, bool denoises, std::size_t margins) {
   if (denoises) scratch.denoiser.start(jobs.size(), margins, scratch.sums.wants_components);
   if (shared != 0) scratch.shared.start(shared, context, jobs.front());
   scratch.margins.clear();
@@ -349,75 +326,146 @@ void DeferredShader::State::start_filters(const LightContext& context, Scratch& 
 }
 
 /// What lies in those strips.
-void DeferredShader::State::shade_margins(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
-                                          bool denoises) {
+void DeferredShader::State::shade_margins(const LightContext& context, TileScratch& scratch,
+                                          std::span<const TileJob> jobs, bool denoises) {
   std::size_t first_tile = jobs.size() + (denoises ? 1 : 0);
   scratch.margins.resize(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const Stopwatch watch;
     TileMargin& margin = scratch.margins[i];
     margin.find(context, jobs[i], denoises ? Denoiser::reach(jobs[i].number.sample) : HalfResShading::kReach,
-                static_cast<std::uint32_t>(first_tile * kTilePixels), scratch.buffers);
+                static_cast<std::uint32_t>(first_tile * kTilePixels), scratch.own.buffers);
     first_tile += margin.strips().size();
+    fetch_triangles(context, margin.strips());
     std::vector<PathVertex> points;
     for (const TileJob& strip : margin.strips()) {
       points.clear();
-      find_primary_vertices(context, strip, {0, strip.rect.height()}, scratch.buffers, scratch.sums, points);
+      find_primary_vertices(context, strip, {0, strip.rect.height()}, scratch.own.buffers, scratch.sums, points);
       if (shared != 0) scratch.shared.add_margin(strip, points);
       if (denoises) scratch.denoiser.add_vertices(context, points);
-      std::ranges::move(points, std::back_inserter(scratch.waiting[0]));
+      std::ranges::move(points, std::back_inserter(scratch.own.waiting[0]));
     }
-    scratch.ms[kSurfaceStep] += watch.ms();
-    shade_waiting(context, scratch);
+    scratch.own.ms[kSurfaceStep] += watch.ms();
+    if (forwarding == nullptr) {
+      shade_waiting(context, scratch.own, scratch.sums);
+    } else {
+      scratch.margin_points.push_back(std::exchange(scratch.own.waiting[0], {}));
+    }
   }
 }
 
+/// Shades scratch.points: wavefronts of whole pixels, from the last one on.
+void DeferredShader::State::shade_points(const LightContext& context, TileScratch& scratch) {
+  std::vector<std::span<PathVertex>> waves;
+  for (std::span<PathVertex> left = scratch.points; !left.empty();) {
+    waves.push_back(last_wavefront(left));
+    left = left.first(left.size() - waves.back().size());
+  }
+  shade_waves(waves.size(), scratch, [&](std::size_t i, WaveScratch& memory) {
+    std::ranges::move(waves[i], std::back_inserter(memory.waiting[0]));
+    shade_waiting(context, memory, scratch.sums);
+  });
+  scratch.points.clear();
+}
+
 /// Light of neighbours in place of a sample's own, once that is known.
-void DeferredShader::State::denoise(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+void DeferredShader::State::denoise(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs,
                                     std::size_t index) {
   const Stopwatch watch;
-  const double before = spent_ms(scratch);
+  const double before = scratch.own.spent_ms();
   const TileFragments& tile_fragments =
-      fragments.of_tile(context, scratch.buffers, jobs.front(), index, scratch.finder);
+      fragments.of_tile(context, scratch.own.buffers, jobs.front(), index, scratch.finder);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const TileJob& job = jobs[i];
     if (job.number.sample >= kDenoisedSamples) break;
     const auto margin = scratch.margins.empty() ? std::span<const TileJob>() : scratch.margins[i].strips();
-    scratch.denoiser.resample_edges(context, job, margin, tile_fragments, scratch.buffers, scratch.sums,
-                                    scratch.waiting[0]);
-    shade_waiting(context, scratch);
+    scratch.denoiser.resample_edges(context, job, margin, tile_fragments, scratch.own.buffers, scratch.sums,
+                                    scratch.points);
+    shade_points(context, scratch);
     scratch.denoiser.resolve(context, job, tile_fragments, scratch.sums);
   }
-  scratch.ms.back() += watch.ms() - (spent_ms(scratch) - before);
+  scratch.own.ms.back() += watch.ms() - (scratch.own.spent_ms() - before);
 }
 
 /// Shows something in place of light.
-void DeferredShader::State::show_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+void DeferredShader::State::show_tile(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs,
                                       std::size_t index, std::span<const ShadedSample> samples) const {
   const trace::Span span("show tile", "tile", index);
   const DenormalsAsZero mode;
   const Stopwatch watch;
   scratch.sums.clear(jobs.front(), index, samples, {});
-  if (scratch.waiting.empty()) scratch.waiting.resize(1);
   const int end = jobs.front().end_row();
   for (RowRange rows{jobs.front().rows.first, 0}; rows.first < end; rows.first = rows.end) {
     rows.end = end_of_wavefront(jobs.front(), rows.first);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
-      std::vector<PathVertex>& points = scratch.waiting[0];
-      find_primary_vertices(context, jobs[i], rows, scratch.buffers, scratch.sums, points);
+      std::vector<PathVertex>& points = scratch.own.waiting[0];
+      find_primary_vertices(context, jobs[i], rows, scratch.own.buffers, scratch.sums, points);
       add_first_surfaces(points, index, samples[i].output);
-      show_pixels(context, jobs[i], rows, scratch.buffers, scratch.sums, points);
+      show_pixels(context, jobs[i], rows, scratch.own.buffers, scratch.sums, points);
       points.clear();
     }
   }
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    scratch.sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);
+    scratch.sums.store(jobs[i], index, samples[i].output, scratch.own.buffers.counts);
   }
-  scratch.ms[kSurfaceStep] += watch.ms();
+  scratch.own.ms[kSurfaceStep] += watch.ms();
 }
 
 /// Shades some rows of one sample after those of another: what one sample has read the next one finds in the cache.
-void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scratch, std::span<const TileJob> jobs,
+void DeferredShader::State::shade_rows(const LightContext& context, TileScratch& scratch, WaveScratch& memory,
+                                       const TilePart& part, const RowRange& rows) const {
+  for (std::size_t i = 0; i < part.jobs.size(); ++i) {
+    const Stopwatch watch;
+    std::vector<PathVertex>& points = memory.waiting[0];
+    find_primary_vertices(context, part.jobs[i], rows, memory.buffers, scratch.sums, points);
+    add_first_surfaces(points, part.index, part.samples[i].output);
+    if (shared != 0 || part.denoises) {
+      const std::lock_guard lock(scratch.mutex);
+      if (shared != 0) scratch.shared.choose(points, rows.first);
+      if (part.denoises) scratch.denoiser.add_vertices(context, points);
+    }
+    memory.ms[kSurfaceStep] += watch.ms();
+    shade_waiting(context, memory, scratch.sums);
+  }
+}
+
+/// Calls body(i, memory) for i in [0, count); where rays travel, many at once, as each wait is for all ranks.
+void DeferredShader::State::shade_waves(std::size_t count, TileScratch& scratch,
+                                        const std::function<void(std::size_t, WaveScratch&)>& body) {
+  if (forwarding == nullptr) {
+    for (std::size_t i = 0; i < count; ++i) body(i, scratch.own);
+    return;
+  }
+  const std::thread::id owner = std::this_thread::get_id();
+  forwarding->for_each_within(count, [&](std::size_t i) {
+    const DenormalsAsZero mode;
+    const CpuStopwatch watch;
+    std::unique_ptr<WaveScratch> memory = wave_memory.take(steps());
+    body(i, *memory);
+    wave_memory.put_back(std::move(memory));
+    if (std::this_thread::get_id() == owner) return;
+    const std::lock_guard lock(scratch.mutex);
+    scratch.helpers_ms += watch.ms();
+  });
+}
+
+/// The margins that are left, and all rows of a tile.
+void DeferredShader::State::shade_all_rows(const LightContext& context, TileScratch& scratch, const TilePart& part) {
+  std::vector<RowRange> rows;
+  const TileJob& job = part.jobs.front();
+  for (int row = job.rows.first; row < job.end_row(); row = rows.back().end) {
+    rows.push_back({row, end_of_wavefront(job, row)});
+  }
+  const std::size_t margins = scratch.margin_points.size();
+  shade_waves(margins + rows.size(), scratch, [&](std::size_t i, WaveScratch& memory) {
+    if (i >= margins) return shade_rows(context, scratch, memory, part, rows[i - margins]);
+    std::swap(memory.waiting[0], scratch.margin_points[i]);
+    shade_waiting(context, memory, scratch.sums);
+  });
+  scratch.margin_points.clear();
+}
+
+void DeferredShader::State::shade_tile(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs,
                                        std::size_t index, std::span<const ShadedSample> samples) {
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
@@ -430,38 +478,22 @@ void DeferredShader::State::shade_tile(const LightContext& context, Scratch& scr
               .diffuse = denoises,
               .cost = shows_cost,
               .margins = margins});
-  if (scratch.waiting.empty()) scratch.waiting.resize(1);
   start_filters(context, scratch, jobs, denoises, margins);
-  const int end = jobs.front().end_row();
-  for (RowRange rows{jobs.front().rows.first, 0}; rows.first < end; rows.first = rows.end) {
-    rows.end = end_of_wavefront(jobs.front(), rows.first);
-    for (std::size_t i = 0; i < jobs.size(); ++i) {
-      const Stopwatch watch;
-      find_primary_vertices(context, jobs[i], rows, scratch.buffers, sums, scratch.waiting[0]);
-      add_first_surfaces(scratch.waiting[0], index, samples[i].output);
-      if (shared != 0) scratch.shared.choose(scratch.waiting[0], rows.first);
-      if (denoises) scratch.denoiser.add_vertices(context, scratch.waiting[0]);
-      scratch.ms[kSurfaceStep] += watch.ms();
-      shade_waiting(context, scratch);
-    }
-  }
+  shade_all_rows(context, scratch, {jobs, samples, index, denoises});
   if (shared != 0) scratch.shared.upsample(sums);
   if (denoises) denoise(context, scratch, jobs, index);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     if (shows_cost) show_cost(jobs[i], sums);
-    sums.store(jobs[i], index, samples[i].output, scratch.buffers.counts);
+    sums.store(jobs[i], index, samples[i].output, scratch.own.buffers.counts);
   }
 }
 
 /// Counts and times of what was lit, gathered from the threads' memory.
 void DeferredShader::State::gather_counts(double spent_ms) {
   counts = {};
-  std::vector<double> ms(kFirstPassStep + passes.size() + 1, 0.0);
-  for (const auto& scratch : idle) {
-    counts += std::exchange(scratch->buffers.counts, {});
-    counts.cut += std::exchange(scratch->buffers.scratch.cut, 0);
-    for (std::size_t i = 0; i < ms.size(); ++i) ms[i] += std::exchange(scratch->ms[i], 0.0);
-  }
+  std::vector<double> ms(steps(), 0.0);
+  for (const auto& scratch : tile_memory.all()) scratch->own.gather(counts, ms);
+  for (const auto& memory : wave_memory.all()) memory->gather(counts, ms);
   if (forwarding != nullptr) share_out(spent_ms, ms);
   if (photons) {
     const PhotonCounts traced = photons->take_counts();
@@ -533,7 +565,7 @@ void DeferredShader::State::shade_part(const Call& call, const ShadedPart& part)
                     wanted,
                     {part.first_row, part.end_row}});
   }
-  std::unique_ptr<Scratch> scratch = take_scratch();
+  std::unique_ptr<TileScratch> scratch = tile_memory.take(steps());
   const LightContext context{.scene = scene,
                              .surfaces = surfaces,
                              .rays = rays ? &*rays : nullptr,
@@ -549,9 +581,9 @@ void DeferredShader::State::shade_part(const Call& call, const ShadedPart& part)
   } else {
     show_tile(context, *scratch, jobs, part.tile, call.samples);
   }
-  const double ms = watch.ms();
+  const double ms = watch.ms() + std::exchange(scratch->helpers_ms, 0.0);
+  tile_memory.put_back(std::move(scratch));
   const std::lock_guard lock(mutex);
-  idle.push_back(std::move(scratch));
   costs.push_back({part.tile, ms});
 }
 

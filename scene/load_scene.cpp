@@ -114,7 +114,8 @@ Scene load_scene(const std::string& source, const SceneLimits& limits, const Sce
   Scene scene = load_unshaped_scene(source, limits, choice).scene;
   if (!has_points_or_lines(scene)) return scene;
   const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
-  shape_points_and_lines(scene, {}, make_view(camera, kDefaultPictureSize, scene.bounds), limits.memory_bytes);
+  const View view = make_view(camera, kDefaultPictureSize, scene.bounds);
+  shape_points_and_lines(scene, {}, std::span(&view, 1), limits.memory_bytes);
   return scene;
 }
 

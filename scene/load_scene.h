@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,8 @@
 #include <vector>
 
 #include "image/image_io.h"
+#include "scene/mesh_reader.h"
+#include "scene/picture_source.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -39,9 +42,15 @@ struct LoadedScene {
   bool in_parts = false;
   /// How many times the ranks hold all of it together, in groups; 0: as often as memory allows, in two parts or more.
   int islands = 1;
+  /// Whether a part that is too large for a rank may come from the disk page by page.
+  bool in_pages = false;
   std::uint64_t memory_limit = SceneLimits{}.memory_bytes;  ///< of one rank
-  /// Reads a mesh again, whole; where some of the scene's have no triangles (without_triangles).
-  std::function<Mesh(std::uint32_t)> whole_mesh = nullptr;
+  /// Reads a mesh again; where some of the scene's have no triangles (without_triangles). As long as this is there, so
+  /// are the meshes' readers.
+  std::function<std::unique_ptr<MeshReader>(std::uint32_t)> read_mesh = nullptr;
+  /// Of each texture where its texels lie, where they were left out (Texels::is_reachable); else null. Empty: none
+  /// were.
+  std::vector<std::shared_ptr<const PictureSource>> sources = {};
 
   // NOLINTNEXTLINE(google-explicit-constructor): a scene is one that was read
   LoadedScene(Scene whole) : scene(std::move(whole)) {}
@@ -52,7 +61,7 @@ struct SceneImporter {
   std::vector<std::string_view> extensions;  ///< in small letters, with their dots
   /// Loads a file into a finished scene, in which points and lines have no shapes yet. Throws Error (Io, BadInput,
   /// Limit; Usage for a choice that it lacks).
-  /// `in_parts`: reads mesh by mesh, and leaves triangles out (LoadedScene::whole_mesh).
+  /// `in_parts`: reads mesh by mesh, and leaves triangles out (LoadedScene::read_mesh).
   LoadedScene (*load)(const std::filesystem::path& path, const SceneLimits& limits, const SceneChoice& choice,
                       bool in_parts);
   /// The files that `load` reads beside the scene's own; none of one it would refuse.

@@ -9,6 +9,7 @@
 
 namespace hpr {
 
+class MeshReader;
 struct Mesh;
 struct Scene;
 struct SurfaceRange;
@@ -44,6 +45,7 @@ inline constexpr std::uint32_t kPartChunk = 512;
 
 /// What is known of a whole mesh without its arrays: none of its triangles are here.
 [[nodiscard]] Mesh without_triangles(const Mesh& whole);
+[[nodiscard]] Mesh without_triangles(MeshReader& whole);
 
 /// Some triangles of a whole mesh, `ranges` ascending and apart, with the vertices they use, and with triangle 0 those
 /// that no triangle of the whole mesh uses, as they count where a camera frames the scene. In the order vertices have

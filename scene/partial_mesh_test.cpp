@@ -51,6 +51,17 @@ TEST(PartialMesh, AMeshWithoutTrianglesKnowsWhatItHad) {
   EXPECT_FALSE(known.holds(0));
 }
 
+TEST(PartialMesh, AnyEdgeMayBeTheLongest) {
+  Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {3, 0, 0}, {0, 4, 0}};
+  mesh.normals.assign(3, {0, 0, 1});
+  for (const glm::uvec3 corners : {glm::uvec3(0, 1, 2), glm::uvec3(1, 2, 0), glm::uvec3(2, 0, 1)}) {
+    mesh.triangles = {corners};
+    EXPECT_EQ(longest_edge(mesh), 5.0);
+    EXPECT_EQ(longest_edge(without_triangles(mesh)), 5.0);
+  }
+}
+
 TEST(PartialMesh, APartHasItsTrianglesByTheirNumbersInTheWhole) {
   const Mesh whole = strip_of(1200);
   const Mesh known = without_triangles(whole);

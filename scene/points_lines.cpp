@@ -177,7 +177,7 @@ Frame frame_of(const Instance& instance) {
 /// Shapes the points or lines of one mesh, as one instance or several of the same frame show them.
 class Shaper {
  public:
-  Shaper(const Mesh& mesh, const Instance& instance, const PointLineWidths& widths, const PixelFootprint& footprint)
+  Shaper(const Mesh& mesh, const Instance& instance, const PointLineWidths& widths, const PixelFootprints& footprint)
       : mesh_(mesh),
         instance_(instance),
         frame_(frame_of(instance)),
@@ -297,7 +297,7 @@ class Shaper {
     const glm::dvec3 b = world(part.y);
     rings_.clear();
     rings_.push_back({0.0, radius_at(a)});
-    add_rings(a, b, {1.0, radius_at(b)}, width_.in_pixels && !footprint_.orthographic ? kMaxHalvings : 0);
+    add_rings(a, b, {1.0, radius_at(b)}, width_.in_pixels && !footprint_.is_constant() ? kMaxHalvings : 0);
   }
 
   /// Those after the last one up to `last`.
@@ -409,7 +409,7 @@ class Shaper {
   const Instance& instance_;
   Frame frame_;
   DrawnWidth width_;
-  const PixelFootprint& footprint_;
+  const PixelFootprints& footprint_;
   double max_radius_ = 0.0;
   std::vector<bool> is_end_;  ///< of each vertex: whether a segment ends there
   std::vector<Ring> rings_;   ///< of the segment at hand
@@ -423,11 +423,11 @@ class Shaper {
 /// Which instances may share a shaped mesh: the mesh it comes of and what its shapes depend on.
 using ShapeKey = std::pair<std::uint32_t, std::array<double, 9>>;
 
-ShapeKey key_of(const Scene& scene, std::size_t instance, const PointLineWidths& widths, bool orthographic) {
+ShapeKey key_of(const Scene& scene, std::size_t instance, const PointLineWidths& widths, bool constant_pixels) {
   const Instance& placed = scene.instances[instance];
   ShapeKey key{placed.mesh, {}};
   const DrawnWidth& width = scene.mesh_of(placed).kind == MeshKind::Points ? widths.points : widths.lines;
-  if (width.in_pixels && !orthographic) {
+  if (width.in_pixels && !constant_pixels) {
     key.second[0] = static_cast<double>(instance);
     return key;
   }
@@ -464,6 +464,36 @@ PixelFootprint footprint_of(const View& view) {
   return {view.eye, std::sqrt(area), view.near_distance, view.orthographic};
 }
 
+namespace {
+
+/// Whether a point lies where the view's screen shows it, or before the near plane on the way there.
+bool shows(const View& view, const glm::dvec3& point) {
+  const glm::dvec3 offset = (point - view.eye) * view.axes;
+  const double distance = view.orthographic ? 1.0 : -offset.z;
+  return distance > 0.0 && offset.x >= view.left * distance && offset.x <= view.right * distance &&
+         offset.y >= view.bottom * distance && offset.y <= view.top * distance;
+}
+
+}  // namespace
+
+PixelFootprints::PixelFootprints(std::span<const View> views) : first_(footprint_of(views.front())) {
+  const auto is_first = [&](const View& view) { return footprint_of(view) == first_; };
+  if (std::ranges::all_of(views, is_first)) return;
+  for (const View& view : views) each_.emplace_back(footprint_of(view), view);
+}
+
+double PixelFootprints::at(const glm::dvec3& point) const {
+  double largest = 0.0;
+  for (const auto& [footprint, view] : each_) {
+    if (shows(view, point)) largest = std::max(largest, footprint.at(point));
+  }
+  return largest > 0.0 ? largest : first_.at(point);
+}
+
+bool PixelFootprints::is_constant() const {
+  return each_.empty() && first_.orthographic;
+}
+
 bool has_points_or_lines(const Scene& scene) {
   return std::ranges::any_of(scene.meshes, [](const Mesh& mesh) { return mesh.kind != MeshKind::Triangles; });
 }
@@ -477,14 +507,14 @@ struct Shapes {
   std::uint64_t parts = 0;                              ///< points and segments
 };
 
-Shapes find_shapes(const Scene& scene, const PointLineWidths& widths, const PixelFootprint& footprint) {
+Shapes find_shapes(const Scene& scene, const PointLineWidths& widths, const PixelFootprints& footprint) {
   Shapes shapes;
   shapes.of_instance.resize(scene.instances.size());
   std::map<ShapeKey, std::size_t> known;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Mesh& mesh = scene.mesh_of(scene.instances[i]);
     if (mesh.kind == MeshKind::Triangles) continue;
-    const ShapeKey key = key_of(scene, i, widths, footprint.orthographic);
+    const ShapeKey key = key_of(scene, i, widths, footprint.is_constant());
     const auto [entry, added] = known.try_emplace(key, shapes.shapers.size());
     shapes.of_instance[i] = entry->second;
     if (!added) continue;
@@ -498,6 +528,24 @@ Cost cost_of(const Shapes& shapes, std::size_t max_level) {
   Cost total;
   for (const Shaper& shaper : shapes.shapers) total.add(shaper.cost(max_level));
   return total;
+}
+
+std::string describe_shapes(const Scene& scene, const PointLineWidths& widths, std::uint64_t triangles) {
+  std::vector<std::string> kinds;
+  bool in_pixels = false;
+  const auto describe = [&](MeshKind kind, const char* name, const DrawnWidth& width) {
+    std::uint64_t count = 0;
+    for (const Instance& instance : scene.instances) {
+      if (scene.mesh_of(instance).kind == kind) count += scene.mesh_of(instance).triangles.size();
+    }
+    if (count == 0) return;
+    kinds.push_back(fmt::format("{} {} of {}", count, name, to_text(width)));
+    in_pixels |= width.in_pixels;
+  };
+  describe(MeshKind::Points, "points", widths.points);
+  describe(MeshKind::Lines, "line segments", widths.lines);
+  return fmt::format("{}, as {} triangles{}", fmt::join(kinds, " and "), triangles,
+                     in_pixels ? " (pixels of the first frame: what comes nearer grows)" : "");
 }
 
 /// Gives instances their meshes: the first shape of a mesh stands in its place, others come last.
@@ -531,8 +579,9 @@ void place_shapes(Scene& scene, const Shapes& shapes, std::vector<Mesh> shaped) 
 
 }  // namespace
 
-void shape_points_and_lines(Scene& scene, const PointLineWidths& widths, const View& view, std::uint64_t memory_bytes) {
-  const PixelFootprint footprint = footprint_of(view);
+void shape_points_and_lines(Scene& scene, const PointLineWidths& widths, std::span<const View> views,
+                            std::uint64_t memory_bytes) {
+  const PixelFootprints footprint(views);
   Shapes shapes = find_shapes(scene, widths, footprint);
   std::size_t level = kLevels - 1;
   while (level > 0 && cost_of(shapes, level).triangles > kMaxTriangles) --level;
@@ -551,6 +600,7 @@ void shape_points_and_lines(Scene& scene, const PointLineWidths& widths, const V
                             shapes.parts, cost_of(shapes, level).triangles),
                 "draw fewer of them");
   }
+  scene.shapes_note = describe_shapes(scene, widths, cost_of(shapes, level).triangles);
   std::vector<Mesh> shaped;
   shaped.reserve(shapes.shapers.size());
   for (Shaper& shaper : shapes.shapers) shaped.push_back(shaper.shape(level));

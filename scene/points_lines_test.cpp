@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -24,18 +25,18 @@ const double kOctahedron = std::sqrt(std::numbers::pi / std::numbers::sqrt3);
 const double kSquare = std::numbers::pi / (2.0 * std::numbers::sqrt2);
 
 /// An eye at (0, 0, 10) that looks along -z. A pixel is 0.01 m wide one metre before it.
-View view_of_pixels() {
+std::vector<View> view_of_pixels() {
   Camera camera;
   camera.eye = {0.0, 0.0, 10.0};
   camera.lens = PerspectiveLens{.vertical_fov_radians = 2.0 * std::atan(1.0), .near_distance = 0.1};
-  return make_view(camera, {200, 200}, {});
+  return {make_view(camera, {200, 200}, {})};
 }
 
 /// Pixels of 0.25 m.
-View orthographic_view() {
+std::vector<View> orthographic_view() {
   Camera camera;
   camera.lens = OrthographicLens{25.0, 25.0, 0.0, 100.0};
-  return make_view(camera, {200, 200}, {});
+  return {make_view(camera, {200, 200}, {})};
 }
 
 Scene scene_of(MeshKind kind, std::vector<glm::vec3> positions, std::vector<glm::uvec3> parts) {
@@ -100,6 +101,46 @@ TEST(PointsAndLines, WidthsAreReadInPixelsOrMetres) {
   for (const DrawnWidth width : {DrawnWidth{3.0}, DrawnWidth{0.1, false}}) {
     EXPECT_EQ(parse_drawn_width(to_text(width)), width);
   }
+}
+
+/// Two screens side by side before one eye: the left one has pixels of 0.01 m one metre away, the right one of 0.04 m.
+std::vector<View> unlike_views() {
+  std::vector<View> views(2, view_of_pixels().front());
+  views[0].right = 0.0;
+  views[0].screen = {100, 200};
+  views[1].left = 0.0;
+  views[1].screen = {25, 50};
+  return views;
+}
+
+TEST(PointsAndLines, PixelsAreThoseOfTheScreenThatShowsAPoint) {
+  // Seen by the left screen, by the right one, by none (then the first one's pixels count), and from behind.
+  Scene scene = points({{-3, 0, 0}, {3, 0, 0}, {0, 30, 0}, {3, 0, 20}});
+  const std::vector<glm::vec3> centers = scene.meshes[0].positions;
+  shape_points_and_lines(scene, pixels(3.0), unlike_views(), kNoLimit);
+  const std::vector<glm::vec3>& corners = scene.meshes.at(0).positions;
+  ASSERT_EQ(corners.size(), 4 * 6U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double distance = glm::distance(glm::dvec3(centers[i]), glm::dvec3(0, 0, 10));
+    const double pixel = (i == 1 ? 0.04 : 0.01) * distance;
+    EXPECT_NEAR(glm::distance(corners[6 * i], centers[i]), kOctahedron * 1.5 * pixel, 1e-5) << i;
+  }
+  // Where both show a point it is drawn for the larger pixels, in whichever order they come.
+  for (const bool turned : {false, true}) {
+    Scene both = points({{3, 0, 0}});
+    std::vector<View> views = unlike_views();
+    views[0].right = 1.0;
+    views[0].screen = {200, 200};
+    if (turned) std::swap(views[0], views[1]);
+    shape_points_and_lines(both, pixels(3.0), views, kNoLimit);
+    EXPECT_NEAR(glm::distance(both.meshes.at(0).positions[0], glm::vec3(3, 0, 0)),
+                kOctahedron * 1.5 * 0.04 * std::sqrt(109.0), 1e-5);
+  }
+  // Of two orthographic views with unlike pixels instances share no shapes.
+  std::vector<View> flat(2, orthographic_view().front());
+  flat[1].screen = {100, 100};
+  EXPECT_TRUE(PixelFootprints(std::span(flat).first(1)).is_constant());
+  EXPECT_FALSE(PixelFootprints(flat).is_constant());
 }
 
 TEST(PointsAndLines, APointIsAnOctahedronOfItsSpheresArea) {
@@ -177,6 +218,16 @@ TEST(PointsAndLines, TheLimitCountsWhatTheyNeed) {
   EXPECT_THROW(shape_points_and_lines(scene, metres(0.1), view_of_pixels(), bytes - 1), Error);
   EXPECT_NO_THROW(shape_points_and_lines(scene, metres(0.1), view_of_pixels(), bytes));
   EXPECT_EQ(memory_of(scene), bytes - 24);
+}
+
+TEST(PointsAndLines, TellWhatTheyWereMadeInto) {
+  Scene scene = points({{0, 0, 0}, {0, 0, 8}});
+  shape_points_and_lines(scene, metres(0.1), view_of_pixels(), kNoLimit);
+  EXPECT_EQ(scene.shapes_note, "2 points of 0.1m, as 16 triangles");
+  scene = line({{0, 0, 0}, {0, 0, -2}});
+  shape_points_and_lines(scene, pixels(3.0), view_of_pixels(), kNoLimit);
+  EXPECT_EQ(scene.shapes_note,
+            "1 line segments of 3px, as 16 triangles (pixels of the first frame: what comes nearer grows)");
 }
 
 TEST(PointsAndLines, ASegmentIsATubeWithTips) {
@@ -317,20 +368,20 @@ TEST(PointsAndLines, FlatInstancesAndMeshesThatNobodySeesDoNoHarm) {
 }
 
 TEST(PointsAndLines, NoScaleOrViewMakesThemInfinite) {
-  View nowhere = view_of_pixels();
+  View nowhere = view_of_pixels().front();
   nowhere.right = std::numeric_limits<double>::quiet_NaN();
-  View huge = orthographic_view();
+  View huge = orthographic_view().front();
   huge.right = 3e38;
   huge.top = 3e38;
   for (const double scale : {1e-300, 1e-31, 1e-20, 1e20, 1e31, 1e200}) {
     for (const double stretch : {1.0, 3.0}) {
-      for (const View& view : {view_of_pixels(), nowhere, huge}) {
+      for (const View& view : {view_of_pixels().front(), nowhere, huge}) {
         for (const PointLineWidths& widths : {pixels(1000.0), metres(1e9), metres(0.01)}) {
           for (const bool is_line : {false, true}) {
             Scene scene = is_line ? line({{0, 0, 0}, {1e-3F, 0, 0}}) : points({{0, 0, 0}});
             scene.instances[0].to_world = glm::dmat4(glm::dmat3(scale));
             scene.instances[0].to_world[1][1] *= stretch;
-            shape_points_and_lines(scene, widths, view, kNoLimit);
+            shape_points_and_lines(scene, widths, std::span(&view, 1), kNoLimit);
             for (const Mesh& mesh : scene.meshes) {
               for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
                 EXPECT_LT(glm::length(glm::dvec3(mesh.positions[i])), 1e18) << scale;

@@ -50,9 +50,8 @@ const MaterialExtensions& extensions_of(const Material& material) {
 /// The least texel of one channel of a texture, 1 without: filtering never goes below it.
 float least_texel(const Scene& scene, const TextureRef& reference, std::uint8_t Rgba8::*channel) {
   if (!reference.present()) return 1.0F;
-  const auto pixels = scene.textures[static_cast<std::size_t>(reference.texture)].image.pixels();
-  if (pixels.empty()) return 1.0F;
-  return static_cast<float>((*std::ranges::min_element(pixels, {}, channel)).*channel) / 255.0F;
+  return static_cast<float>(scene.textures[static_cast<std::size_t>(reference.texture)].image.facts().least.*channel) /
+         255.0F;
 }
 
 /// The least a material can reach anywhere, its coat included.
@@ -78,9 +77,8 @@ float min_metallic(const Scene& scene, const Material& material) {
 bool transmits_somewhere(const Scene& scene, const Material& material) {
   if (!(material.transmission > 0.0F)) return false;
   if (!material.transmission_texture.present()) return true;
-  const auto texture = static_cast<std::size_t>(material.transmission_texture.texture);
-  const auto pixels = scene.textures[texture].image.pixels();
-  return pixels.empty() || std::ranges::any_of(pixels, [](const Rgba8& texel) { return texel.r > 0; });
+  const Texels& texels = scene.textures[static_cast<std::size_t>(material.transmission_texture.texture)].image;
+  return texels.size().area() == 0 || texels.facts().largest.r > 0;
 }
 
 bool shines(const std::optional<Environment>& environment) {
@@ -188,11 +186,10 @@ bool emits(const Scene& scene, const Material& material) {
   if (material.unlit) return false;  // shows its colour and lights nothing
   if (!(std::max({material.emissive.r, material.emissive.g, material.emissive.b}) > 0.0F)) return false;
   if (!material.emissive_texture.present()) return true;
-  const auto pixels = scene.textures[static_cast<std::size_t>(material.emissive_texture.texture)].image.pixels();
-  return pixels.empty() || std::ranges::any_of(pixels, [&](const Rgba8& texel) {
-           return (material.emissive.r > 0.0F && texel.r > 0) || (material.emissive.g > 0.0F && texel.g > 0) ||
-                  (material.emissive.b > 0.0F && texel.b > 0);
-         });
+  const Texels& texels = scene.textures[static_cast<std::size_t>(material.emissive_texture.texture)].image;
+  const Rgba8 largest = texels.facts().largest;
+  return texels.size().area() == 0 || (material.emissive.r > 0.0F && largest.r > 0) ||
+         (material.emissive.g > 0.0F && largest.g > 0) || (material.emissive.b > 0.0F && largest.b > 0);
 }
 
 bool gives_light(const Scene& scene) {

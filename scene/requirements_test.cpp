@@ -52,7 +52,9 @@ TEST(Requirements, EmittingSurfacesAndTheEnvironmentAreLights) {
   scene.materials[0].emissive_texture.texture = 0;
   EXPECT_FALSE(gives_light(scene)) << "a green light under a texture without green";
   EXPECT_FALSE(requirements_of(scene).shadow.needed);
-  scene.textures[0].image.at(1, 1).g = 1;
+  Image<Rgba8> image = scene.textures[0].image.image();
+  image.at(1, 1).g = 1;
+  scene.textures[0].image = std::move(image);
   EXPECT_TRUE(gives_light(scene));
   scene.instances.clear();
   EXPECT_FALSE(gives_light(scene)) << "no surface shows the material";
@@ -121,7 +123,9 @@ TEST(Requirements, ASmoothTexelMakesARoughMaterialMirror) {
   scene.textures[0].image = Image<Rgba8>({4, 4}, Rgba8{0, 255, 0, 255});
   scene.materials[0].metallic_roughness_texture.texture = 0;
   EXPECT_FALSE(requirements_of(scene).reflection.needed);
-  scene.textures[0].image.at(2, 3).g = 40;
+  Image<Rgba8> image = scene.textures[0].image.image();
+  image.at(2, 3).g = 40;
+  scene.textures[0].image = std::move(image);
   EXPECT_TRUE(requirements_of(scene).reflection.needed);
 }
 
@@ -178,7 +182,9 @@ TEST(Requirements, WhatAMaterialIsMadeOfDecidesWhatItMirrorsAndTransmits) {
   dark.textures[0].image = Image<Rgba8>({2, 2}, {0, 255, 255, 255});
   dark.materials[0].transmission_texture.texture = 0;
   EXPECT_FALSE(requirements_of(dark).refraction.needed) << "a texture that lets nothing through";
-  dark.textures[0].image.at(1, 0).r = 1;
+  Image<Rgba8> image = dark.textures[0].image.image();
+  image.at(1, 0).r = 1;
+  dark.textures[0].image = std::move(image);
   EXPECT_TRUE(requirements_of(dark).refraction.needed);
   Material grazing = metal;
   grazing.base_color = black.base_color;
@@ -214,7 +220,9 @@ TEST(Requirements, ATexelWithoutMetalIsDiffuse) {
   scene.textures[0].image = Image<Rgba8>({2, 2}, Rgba8{0, 255, 255, 255});
   scene.materials[0].metallic_roughness_texture.texture = 0;
   EXPECT_FALSE(requirements_of(scene).ambient_occlusion.needed);
-  scene.textures[0].image.at(1, 0).b = 0;
+  Image<Rgba8> image = scene.textures[0].image.image();
+  image.at(1, 0).b = 0;
+  scene.textures[0].image = std::move(image);
   EXPECT_TRUE(requirements_of(scene).ambient_occlusion.needed);
   EXPECT_TRUE(requirements_of(scene).indirect.needed);
 }

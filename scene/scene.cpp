@@ -3,15 +3,61 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "core/error.h"
 
 namespace hpr {
+namespace {
+
+/// Between the corners of a box, along its longest side.
+double extent_of(const Bounds& box) {
+  const glm::dvec3 size = 0.5 * box.high - 0.5 * box.low;
+  return 2.0 * std::max({size.x, size.y, size.z});
+}
+
+glm::dvec3 center_of(const Bounds& box) {
+  return 0.5 * box.high + 0.5 * box.low;
+}
+
+/// The upper median of some values.
+double median_of(std::vector<double>& values) {
+  const auto median = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, median);
+  return *median;
+}
+
+/// The center of most of the small things in a scene, axis by axis, if they stand closely together: half of them within
+/// a thousandth of the scene. Else, and where that is about the scene's center, this.
+glm::dvec3 detail_center_of(const Bounds& bounds, std::span<const Bounds> boxes) {
+  constexpr double kSmall = 1e-3;
+  const glm::dvec3 center = center_of(bounds);
+  const double small = kSmall * extent_of(bounds);
+  std::array<std::vector<double>, 3> centers;
+  for (const Bounds& box : boxes) {
+    if (!(extent_of(box) <= small)) continue;
+    for (int axis = 0; axis < 3; ++axis) centers.at(static_cast<std::size_t>(axis)).push_back(center_of(box)[axis]);
+  }
+  if (centers[0].empty()) return center;
+  glm::dvec3 detail(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double>& values = centers.at(static_cast<std::size_t>(axis));
+    detail[axis] = median_of(values);
+    for (double& value : values) value = std::abs(value - detail[axis]);
+    if (!(median_of(values) <= small)) return center;
+  }
+  return glm::distance(detail, center) > small ? detail : center;
+}
+
+}  // namespace
+
 void finish_scene(Scene& scene) {
   if (scene.materials.empty()) scene.materials.emplace_back();
   constexpr std::uint64_t kMaxTriangles = std::numeric_limits<std::uint32_t>::max() - std::uint64_t{1};
@@ -22,6 +68,7 @@ void finish_scene(Scene& scene) {
 
   std::uint64_t triangles = 0;
   Bounds bounds = empty_bounds();
+  std::vector<Bounds> placed;
   for (Instance& instance : scene.instances) {
     HPR_CHECK(instance.mesh < scene.meshes.size());
     instance.first_surface = static_cast<std::uint32_t>(triangles);
@@ -33,9 +80,17 @@ void finish_scene(Scene& scene) {
     if (scene.mesh_of(instance).triangle_count() == 0) continue;
     const Bounds box = transformed(instance.to_world, boxes[instance.mesh]);
     bounds = united(bounds, box);
+    placed.push_back(box);
   }
   scene.triangles = static_cast<std::uint32_t>(triangles);
   scene.bounds = triangles > 0 ? bounds : Bounds{};
+  scene.detail_center = detail_center_of(scene.bounds, placed);
+}
+
+std::uint64_t mesh_triangles(const Scene& scene) {
+  std::uint64_t triangles = 0;
+  for (const Mesh& mesh : scene.meshes) triangles += mesh.triangle_count();
+  return triangles;
 }
 
 std::uint64_t memory_of(const Mesh& mesh) {
@@ -47,7 +102,7 @@ std::uint64_t memory_of(const Mesh& mesh) {
 std::uint64_t memory_of(const Scene& scene) {
   std::uint64_t bytes = scene.instances.size() * sizeof(Instance);
   for (const Mesh& mesh : scene.meshes) bytes += memory_of(mesh);
-  for (const Texture& texture : scene.textures) bytes += texture.image.pixels().size_bytes();
+  for (const Texture& texture : scene.textures) bytes += texture.image.is_reachable() ? texture.image.size_bytes() : 0;
   return bytes;
 }
 

@@ -18,6 +18,7 @@
 #include "image/image.h"
 #include "scene/bounds.h"
 #include "scene/partial_mesh.h"
+#include "scene/texels.h"
 
 /// What is drawn, as plain data, independent of how. Right-handed, y up, metres; colours are linear with sRGB
 /// primaries.
@@ -25,9 +26,11 @@ namespace hpr {
 
 enum class Wrap : std::uint8_t { Repeat, MirroredRepeat, ClampToEdge };
 
+class PartPages;
+
 struct Texture {
   std::string name;
-  Image<Rgba8> image;  ///< as stored in the file; whether it means sRGB or linear values depends on who refers to it
+  Texels image;  ///< whether it means sRGB or linear values depends on who refers to it
   Wrap wrap_s = Wrap::Repeat;
   Wrap wrap_t = Wrap::Repeat;
   bool nearest = false;  ///< magnification filter; bilinear otherwise
@@ -246,11 +249,14 @@ struct Scene {
   std::vector<Mesh> meshes;
   std::vector<Material> materials;  ///< never empty once finished
   std::vector<Texture> textures;
-  std::vector<Instance> instances;  ///< in ascending order of first_surface
+  std::shared_ptr<TexelStore> texel_store;  ///< of those whose texels come when they are looked at; null: none do
+  std::vector<Instance> instances;          ///< in ascending order of first_surface
   /// The nodes that placed them: one per instance, or none at all. Nothing a picture shows: no part of content_hash.
   std::vector<std::string> node_names;
   /// What environment there is and why, for people: no part of content_hash either.
   std::string environment_note;
+  /// What points and lines were made into, for people; empty: there were none.
+  std::string shapes_note;
   std::vector<Light> lights;  ///< see gives_light for when the renderer adds a headlight
   std::vector<Camera> cameras;
   Rgb background;  ///< radiance where no surface is and no environment; lights nothing
@@ -264,9 +270,15 @@ struct Scene {
                                  ///< say; known where it was loaded
   std::uint32_t triangles = 0;   ///< of all instances: the number of surface ids
   Bounds bounds;                 ///< of all instances; low == high == 0 when there is nothing
+  /// Where single precision is to be finest: the bounds' center, or where small things stand together far from it.
+  glm::dvec3 detail_center{0.0};
   /// Of a scene whose meshes are shared out: the surfaces that each part has, and as what is here does not tell, the
   /// instances that are refined (refined_instances) and a camera that sees all of it (framing_camera).
   std::vector<std::vector<SurfaceRange>> parts;
+  /// Where parts come from the disk page by page: the surfaces of the pages, as many of each part, in the parts' order;
+  /// and those of the part that is here. No part of content_hash.
+  std::vector<std::vector<SurfaceRange>> pages;
+  std::shared_ptr<PartPages> part_pages;
   std::vector<std::uint8_t> refined;
   std::optional<Camera> framing;
 
@@ -290,9 +302,11 @@ struct SurfaceLocation {
 };
 
 /// Completes a scene whose meshes, materials and instances are set: adds a default material if there is none, numbers
-/// the surfaces, computes `triangles` and `bounds`. Throws Error (Limit) past 2^32 - 2 triangles.
+/// the surfaces, computes `triangles`, `bounds` and `detail_center`. Throws Error (Limit) past 2^32 - 2 triangles.
 void finish_scene(Scene& scene);
 
+/// The triangles of a scene's meshes, each once however many instances it has.
+[[nodiscard]] std::uint64_t mesh_triangles(const Scene& scene);
 /// What a scene's arrays take, in bytes: those that are here, and of a mesh.
 [[nodiscard]] std::uint64_t memory_of(const Scene& scene);
 [[nodiscard]] std::uint64_t memory_of(const Mesh& mesh);

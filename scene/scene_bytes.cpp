@@ -11,6 +11,7 @@
 #include <streambuf>
 
 #include "core/bytes.h"
+#include "scene/mesh_reader.h"
 #include "scene/scene.h"
 
 // Every struct of scene.h, field by field: what stands here is what reaches the other ranks and what the content hash
@@ -56,8 +57,17 @@ void serialize(Archive& archive, Image<Pixel>& image) {
   archive(cereal::binary_data(image.pixels().data(), image.pixels().size_bytes()));
 }
 template <typename Archive>
+void serialize(Archive& archive, Rgba8& c) {
+  archive(c.r, c.g, c.b, c.a);
+}
+template <typename Archive>
+void serialize(Archive& archive, TexelFacts& f) {
+  archive(f.least, f.largest, f.content);
+}
+/// Without its texels.
+template <typename Archive>
 void serialize(Archive& archive, Texture& t) {
-  archive(t.name, t.wrap_s, t.wrap_t, t.nearest, t.image);
+  archive(t.name, t.wrap_s, t.wrap_t, t.nearest);
 }
 template <typename Archive>
 void serialize(Archive& archive, TextureRef& t) {
@@ -133,11 +143,11 @@ template <typename Archive>
 void serialize(Archive& archive, PartialMesh& s) {
   archive(s.runs, s.triangles, s.bounds, s.reach, s.longest_edge, s.bytes, s.content);
 }
-/// Without its meshes.
+/// Without its meshes and texels.
 template <typename Archive>
 void serialize(Archive& archive, Scene& s) {
   archive(s.name, s.materials, s.textures, s.instances, s.lights, s.cameras, s.background, s.environment, s.warnings,
-          s.triangles, s.bounds);
+          s.triangles, s.bounds, s.detail_center);
 }
 
 namespace {
@@ -215,6 +225,49 @@ void load_extensions(Scene& scene, cereal::BinaryInputArchive& archive) {
   }
 }
 
+/// Where the texels of a texture stand in a scene's bytes.
+enum class TexelLocation : std::uint8_t { Here, Earlier, Elsewhere };
+
+/// Texels that several textures have are written once; of those that are elsewhere only what is known.
+void save_texels(const Scene& scene, cereal::BinaryOutputArchive& archive) {
+  for (std::size_t i = 0; i < scene.textures.size(); ++i) {
+    const Texels& texels = scene.textures[i].image;
+    Size size = texels.size();
+    TexelFacts facts = texels.facts();
+    archive(size, facts);
+    const auto end = scene.textures.begin() + static_cast<std::ptrdiff_t>(i);
+    const auto first =
+        std::find_if(scene.textures.begin(), end, [&](const Texture& other) { return other.image.is_same(texels); });
+    if (!texels.is_reachable()) {
+      archive(TexelLocation::Elsewhere);
+    } else if (first != end) {
+      archive(TexelLocation::Earlier, static_cast<std::uint64_t>(first - scene.textures.begin()));
+    } else {
+      archive(TexelLocation::Here, cereal::binary_data(texels.pixels().data(), texels.size_bytes()));
+    }
+  }
+}
+
+void load_texels(Scene& scene, cereal::BinaryInputArchive& archive) {
+  for (Texture& texture : scene.textures) {
+    Size size;
+    TexelFacts facts;
+    TexelLocation location = TexelLocation::Here;
+    archive(size, facts, location);
+    if (location == TexelLocation::Elsewhere) {
+      texture.image = Texels(size, facts);
+    } else if (location == TexelLocation::Earlier) {
+      std::uint64_t first = 0;
+      archive(first);
+      texture.image = scene.textures.at(first).image;
+    } else {
+      Image<Rgba8> image(size);
+      archive(cereal::binary_data(image.pixels().data(), image.pixels().size_bytes()));
+      texture.image = std::move(image);
+    }
+  }
+}
+
 void save_mesh(const Mesh& mesh, cereal::BinaryOutputArchive& archive) {
   archive(const_cast<Mesh&>(mesh), mesh.partial != nullptr);  // an output archive only reads
   if (mesh.partial) archive(const_cast<PartialMesh&>(*mesh.partial));
@@ -270,12 +323,14 @@ Mesh mesh_from_bytes(std::span<const std::byte> bytes) {
 
 std::vector<std::byte> to_bytes(const Scene& scene) {
   return bytes_of([&](cereal::BinaryOutputArchive& archive) {
-    archive(scene.node_names, scene.environment_note, scene.parts, const_cast<Scene&>(scene));
+    archive(scene.node_names, scene.environment_note, scene.shapes_note, scene.parts, scene.pages,
+            const_cast<Scene&>(scene));
     archive(static_cast<std::uint64_t>(scene.meshes.size()));
     for (const Mesh& mesh : scene.meshes) save_mesh(mesh, archive);
     const auto extended = [](const Material& material) { return material.extensions != nullptr; };
     archive(static_cast<std::uint64_t>(std::ranges::count_if(scene.materials, extended)));
     save_extensions(scene, archive);
+    save_texels(scene, archive);
   });
 }
 
@@ -285,10 +340,11 @@ Scene scene_from_bytes(std::span<const std::byte> bytes) {
   cereal::BinaryInputArchive archive(stream);
   Scene scene;
   std::uint64_t meshes = 0;
-  archive(scene.node_names, scene.environment_note, scene.parts, scene, meshes);
+  archive(scene.node_names, scene.environment_note, scene.shapes_note, scene.parts, scene.pages, scene, meshes);
   scene.meshes.resize(meshes);
   for (Mesh& mesh : scene.meshes) load_mesh(mesh, archive);
   load_extensions(scene, archive);
+  load_texels(scene, archive);
   return scene;
 }
 
@@ -297,11 +353,38 @@ std::uint64_t content_hash(const Mesh& mesh) {
   return hash_of([&](cereal::BinaryOutputArchive& archive) { archive(const_cast<Mesh&>(mesh)); });
 }
 
+std::uint64_t content_hash(MeshReader& mesh) {
+  return hash_of([&](cereal::BinaryOutputArchive& archive) {
+    constexpr std::uint32_t kPiece = 1U << 16U;
+    archive(mesh.name, mesh.material);
+    std::vector<float> values;
+    for (const VertexArray array : kVertexArrays) {
+      const std::uint32_t count = mesh.has(array) ? mesh.vertices() : 0;
+      archive(cereal::size_type{count});
+      for (std::uint32_t first = 0; first < count; first += std::min(kPiece, count - first)) {
+        mesh.read(array, first, first + std::min(kPiece, count - first), values);
+        archive(cereal::binary_data(values.data(), values.size() * sizeof(float)));
+      }
+    }
+    const std::uint32_t count = mesh.triangles();
+    archive(cereal::size_type{count});
+    std::vector<glm::uvec3> triangles;
+    for (std::uint32_t first = 0; first < count; first += std::min(kPiece, count - first)) {
+      mesh.read_triangles(first, first + std::min(kPiece, count - first), triangles);
+      archive(cereal::binary_data(triangles.data(), triangles.size() * sizeof(glm::uvec3)));
+    }
+  });
+}
+
 std::uint64_t content_hash(const Scene& scene) {
   return hash_of([&](cereal::BinaryOutputArchive& archive) {
     for (const Mesh& mesh : scene.meshes) archive(content_hash(mesh));
     archive(const_cast<Scene&>(scene));
     save_extensions(scene, archive);
+    for (const Texture& texture : scene.textures) {
+      Size size = texture.image.size();
+      archive(size, texture.image.facts().content);
+    }
   });
 }
 

@@ -178,7 +178,12 @@ TEST(ContentHash, ChangesWithEveryField) {
       {"sheen texture", [](Scene& s) { extend(s, &MaterialExtensions::sheen_color_texture, TextureRef{}); }},
       {"film texture", [](Scene& s) { extend(s, &MaterialExtensions::iridescence_thickness_texture, TextureRef{}); }},
       {"texture name", [](Scene& s) { s.textures[0].name += "x"; }},
-      {"texel", [](Scene& s) { s.textures[0].image.at(1, 2).a = 5; }},
+      {"texel",
+       [](Scene& s) {
+         Image<Rgba8> image = s.textures[0].image.image();
+         image.at(1, 2).a = 5;
+         s.textures[0].image = std::move(image);
+       }},
       {"texture shape",
        [](Scene& s) {
          s.textures[0].image = Image<Rgba8>({3, 2}, {1, 2, 3, 4});

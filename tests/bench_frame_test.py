@@ -13,6 +13,7 @@ import tempfile
 
 from program import expect, failures, run
 
+spread = []
 SMALL = ["gen:gallery", "--size", "96x64", "--quality", "draft", "--reps", "2"]
 
 
@@ -26,7 +27,24 @@ def rows_of(folder, *words):
         expect((row["floor"] is None) == (row["ratio"] is None), f"no floor, no ratio: {row}")
         if row["floor"]:
             expect(abs(row["ratio"] - row["floor"] / row["ours"]) < 1e-9 * row["ratio"], f"ratio: {row}")
-    return found["rows"]
+    # Then come how its work spreads over threads.
+    frame = next(i for i, row in enumerate(found["rows"]) if row["name"].startswith("the frame"))
+    spread.append(found["rows"][frame + 1:])
+    return found["rows"][:frame + 1]
+
+
+def threads(folder):
+    for count in (1, 2, 7):
+        rows_of(folder, *SMALL, "--threads", str(count))
+        rows = spread[-1]
+        if count == 1:
+            expect([row["name"] for row in rows] == ["processor time"], f"of one thread: {rows}")
+            continue
+        expect([row["name"] for row in rows] == ["processor time", "of one thread alone",
+               f"{count} threads, loops shared evenly", f"{count} threads, loops as they are"], f"{rows}")
+        everything, alone, even, scheduled = (row["ours"] for row in rows)
+        expect(alone < everything and alone < even <= scheduled * 1.001 and scheduled < everything * 1.001, f"{rows}")
+        expect(abs(rows[3]["floor"] - everything / count) < 1e-9 * everything, f"an even share: {rows}")
 
 
 def steps(folder):
@@ -63,7 +81,7 @@ def refused(folder):
 
 
 def main():
-    for case in (steps, keys_alone, refused):
+    for case in (steps, threads, keys_alone, refused):
         with tempfile.TemporaryDirectory(prefix="hpr-frame-") as scratch:
             case(pathlib.Path(scratch))
     print(f"{len(failures)} failed" if failures else "every step has its row")

@@ -32,7 +32,7 @@ def sizes(folder):
     expect(cases == wanted and len(found["runs"]) == len(wanted), f"runs: {cases}")
     for row in found["runs"]:
         expect(row["frames"] == 4 and 0 < row["ms"]["min"] <= row["ms"]["median"] <= row["ms"]["max"], f"times: {row}")
-        expect(len(row["rank_ms"]) == row["ranks"] and row["hosts"] == 1, f"ranks: {row}")
+        expect(len(row["rank_ms"]) == row["ranks"] and row["hosts"] == 1 and row["gpus"] >= 0, f"ranks: {row}")
         expect((row["bytes_sent"] > 0) == (row["ranks"] > 1), f"bytes: {row}")
     with (folder / "r.csv").open(newline="") as file:
         expect(len(list(csv.DictReader(file))) == 4 * len(wanted), "one line per frame")
@@ -59,6 +59,31 @@ def inside_a_job(folder):
     expect([(row["ranks"], row["threads"]) for row in rows] == [(2, 1)], f"the job's ranks: {rows}")
 
 
+def simulated(folder):
+    cluster = "hosts=4,ranks=8,latency=5us,bandwidth=1GB/s"
+    result = run(folder, "bench", "scale", *SMALL, "--simulate", cluster, "--sides", "2", "--tiles", "1x1,2x1", "--json", "--csv",
+                 "m.csv", "--html", "m.html")
+    expect(result.returncode == 0, f"left with {result.returncode}: {result.stderr}")
+    found = json.loads(result.stdout)
+    expect(found["schema"] == "hpr.bench-scale-model/1" and found["simulated"]["latency_s"] == 5e-6, f"{found['schema']}")
+    runs = {(row["tiles"], row["ranks"], row["distribution"]): row for row in found["runs"]}
+    expect(len(runs) == len(found["runs"]) == 2 * 4 * 4, f"runs: {sorted(runs)}")
+    for row in found["runs"]:
+        phases = sum(row[f"ms_{phase}"] for phase in ("draw", "composite", "light", "prepare", "show"))
+        expect(abs(phases - row["ms"]) < 1e-6 * row["ms"], f"phases: {row}")
+        expect(row["hosts"] == min(4, (row["ranks"] + 1) // 2), f"hosts: {row}")
+        expect(row["efficiency"] > 0.9 or row["limit"], f"limit: {row}")
+    with (folder / "m.csv").open(newline="") as file:
+        expect(len(list(csv.DictReader(file))) == len(runs), "one line per run")
+    xml.etree.ElementTree.parse(folder / "m.html")
+    expect("No frame was drawn on such a cluster" in (folder / "m.html").read_text(), "a page that looks measured")
+    for words, hint in ((["--ranks", "2"], "ranks=N"), (["--data", "partitioned"], "without --simulate")):
+        refusal = run(folder, "bench", "scale", *SMALL, "--simulate", cluster, *words)
+        expect(refusal.returncode == 2 and hint in refusal.stderr, f"{words}: {refusal.returncode} {refusal.stderr}")
+    alone = run(folder, "bench", "scale", *SMALL, "--sides", "2")
+    expect(alone.returncode == 2 and "--simulate" in alone.stderr, f"--sides alone: {alone.stderr}")
+
+
 def refused(folder):
     for words, code, hint in ((["--tiles", "70x70"], 6, "4096"), (["--spp", "until:1s"], 2, "--spp 16"),
                               (["--primary", "auto"], 2, "raster"), (["--ranks", "0"], 2, "--ranks 1,2"), (["--threads", "1,x"], 2, "--threads 1,2"),
@@ -72,7 +97,7 @@ def refused(folder):
 
 
 def main():
-    for case in (sizes, inside_a_job, refused):
+    for case in (sizes, inside_a_job, simulated, refused):
         with tempfile.TemporaryDirectory(prefix="hpr-scale-") as scratch:
             case(pathlib.Path(scratch))
     print(f"{len(failures)} failed" if failures else "frames scale alike")

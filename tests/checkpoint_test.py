@@ -184,8 +184,14 @@ def start(folder, *arguments):
 
 
 def generations(folder, name):
-    """What is there of a checkpoint: the times of both files."""
-    return {path.name: path.stat().st_mtime_ns for path in folder.glob(f"{name}*")}
+    """What is there of a checkpoint: the times of both files. Of a run under way, one may be renamed between two looks."""
+    times = {}
+    for path in folder.glob(f"{name}*"):
+        try:
+            times[path.name] = path.stat().st_mtime_ns
+        except FileNotFoundError:
+            continue
+    return times
 
 
 def kill_job(process):

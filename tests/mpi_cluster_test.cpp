@@ -3,20 +3,29 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <mpi.h>
+#include <sched.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <numeric>
+#include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "cluster/distribution/scene_distribution.h"
 #include "cluster/transport/collectives.h"
+#include "cluster/transport/host_memory.h"
 #include "cluster/transport/mpi_communicator.h"
 #include "cluster/transport/test_communicator.h"
 #include "cluster/transport/work_board.h"
 #include "core/error.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {
@@ -79,6 +88,67 @@ TEST(Mpi, ExchangeMayHaveTwoSizes) {
       const auto size_of = [](int rank) { return static_cast<std::size_t>(rank) * 700'001; };
       EXPECT_TRUE(test::exchange_with(comm, test::message_of(comm.rank(), size_of(comm.rank())), partner) ==
                   test::message_of(partner, size_of(partner)));
+    }
+  }
+}
+
+/// This thread runs on one core alone while it lives, that of rank 0.
+class OnOneCore {
+ public:
+  OnOneCore() {
+    sched_getaffinity(0, sizeof(cpu_set_t), &before_);
+    unsigned core = 0;
+    while (core + 1 < CPU_SETSIZE && CPU_ISSET(core, &before_) == 0) ++core;
+    MPI_Bcast(&core, 1, MPI_UNSIGNED, 0, MPI_COMM_WORLD);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(core, &one);
+    works_ = sched_setaffinity(0, sizeof(cpu_set_t), &one) == 0;
+  }
+  ~OnOneCore() { sched_setaffinity(0, sizeof(cpu_set_t), &before_); }
+  OnOneCore(const OnOneCore&) = delete;
+  OnOneCore& operator=(const OnOneCore&) = delete;
+
+  [[nodiscard]] bool works() const { return works_; }
+
+ private:
+  cpu_set_t before_{};
+  bool works_ = false;
+};
+
+/// How often this thread has gone to sleep.
+long count_sleeps() {
+  rusage usage{};
+  ::getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_nvcsw;
+}
+
+TEST(Mpi, RanksThatShareACoreSleepWhileTheyWait) {
+  const OnOneCore affinity;
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  if (comm.size() == 1) return;
+  constexpr std::chrono::milliseconds kWait{400};
+  constexpr std::chrono::milliseconds kMaxLate{4000};  // on a machine that is busy with other work
+  for (const bool in_subset : {false, true}) {
+    std::vector<int> all(static_cast<std::size_t>(comm.size()));
+    std::iota(all.begin(), all.end(), 0);
+    const std::unique_ptr<Communicator> subset = in_subset ? comm.subset(all) : nullptr;
+    Communicator& used = in_subset ? *subset : comm;
+    barrier(used);
+    const CpuStopwatch cpu;
+    const Stopwatch watch;
+    const long before = count_sleeps();
+    std::uint64_t value = 7;
+    if (used.rank() == 0) {
+      std::this_thread::sleep_for(kWait);
+      for (int rank = 1; rank < used.size(); ++rank) used.send(std::as_bytes(std::span(&value, 1)), rank);
+      continue;
+    }
+    used.receive(std::as_writable_bytes(std::span(&value, 1)), 0);
+    EXPECT_LT(watch.ms(), static_cast<double>((kWait + kMaxLate).count()));  // messages still come soon
+    if (affinity.works()) {
+      EXPECT_LT(cpu.ms(), static_cast<double>(kWait.count()) / 2.0);
+      EXPECT_GT(count_sleeps() - before, 20);
     }
   }
 }
@@ -177,6 +247,27 @@ TEST(Mpi, RanksOfAHostDrawEachPieceOfWorkOnce) {
       for (std::uint64_t piece = 0; piece < kPieces + rank; ++piece) expected.push_back(1000 * rank + piece);
     }
     EXPECT_EQ(all, expected) << "round " << round;
+  }
+}
+
+TEST(Mpi, RanksOfAHostShareOneBlock) {
+  MpiCommunicator comm(MPI_COMM_WORLD);
+  for (int again = 0; again < 3; ++again) {
+    HostMemory memory(comm, 100'000);
+    EXPECT_EQ(memory.ranks(), comm.size());
+    EXPECT_EQ(memory.is_first(), comm.rank() == 0);
+    for (std::size_t round = 1; round <= 200; ++round) {
+      memory.bytes()[round * 400 + static_cast<std::size_t>(comm.rank())] = static_cast<std::byte>(round);
+      memory.meet();
+      for (std::size_t rank = 0; rank < static_cast<std::size_t>(comm.size()); ++rank) {
+        ASSERT_EQ(memory.bytes()[round * 400 + rank], static_cast<std::byte>(round)) << rank;
+      }
+    }
+    memory.meet();
+    if (memory.is_first()) HostMemory::release(memory.bytes());
+    memory.meet();
+    const std::span<const std::byte> whole_pages = memory.bytes().first(16 * 4096);
+    EXPECT_EQ(std::ranges::count(whole_pages, std::byte{0}), std::ssize(whole_pages));
   }
 }
 

@@ -81,7 +81,7 @@ struct Agreement {
 
 Agreement compare(const Scene& scene, const View& view, const Image<Key>& raster, const Image<Key>& rays) {
   Agreement result;
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   for (int y = 0; y < raster.height(); ++y) {
     for (int x = 0; x < raster.width(); ++x) {
       const Key a = raster.at(x, y);
@@ -129,7 +129,7 @@ Agreement agreement_on(const std::string& source, Size size, int tries) {
   const auto context = make_gl_context({.backend = "auto", .device = -1, .local_rank = 0, .threads = threads});
   Rasterizer rasterizer(*context, scene, std::array{SurfaceRange{0, scene.triangles}}, threads);
   const Stopwatch build;
-  const RayScene rays(scene, RaySpace(scene.bounds), threads);
+  const RayScene rays(scene, RaySpace(scene), threads);
   const double build_ms = build.ms();
   PrimaryRays primary(scene, rays, threads);
   std::vector<double> raster_ms;

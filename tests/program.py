@@ -39,8 +39,8 @@ def run(folder, *arguments, timeout=120, **options):
                           timeout=timeout, check=False, **options)
 
 
-def run_to(folder, arguments, expected=0):
+def run_to(folder, arguments, expected=0, timeout=300):
     """Fails unless it leaves with that code."""
-    result = run(folder, *arguments, timeout=300)
+    result = run(folder, *arguments, timeout=timeout)
     check(result.returncode == expected, f"hpr {' '.join(arguments)} left with {result.returncode}:\n{result.stderr[-2000:]}")
     return result

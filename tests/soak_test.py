@@ -79,8 +79,11 @@ class Run:
     def kill(self):
         ranks = self.ranks()
         if self.index > 0 and ranks and self.dice.random() < 0.5:
-            os.kill(self.dice.choice(ranks), signal.SIGKILL)
-            self.killed["rank"] += 1
+            try:
+                os.kill(self.dice.choice(ranks), signal.SIGKILL)
+                self.killed["rank"] += 1
+            except ProcessLookupError:  # a job that is starting again
+                pass
             return
         self.display.kill()
         self.display.log.close()

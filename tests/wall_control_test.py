@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 
+from processes import ranks_of
 from program import HPR, expect, failures
 
 
@@ -51,12 +52,7 @@ class Wall:
 
     def ranks(self):
         """The processes of the job's ranks: children of mpiexec, which is the run's."""
-        found = []
-        for children in pathlib.Path(f"/proc/{self.job.pid}/task").glob("*/children"):
-            for launcher in children.read_text().split():
-                for ranks in pathlib.Path(f"/proc/{launcher}/task").glob("*/children"):
-                    found += [int(pid) for pid in ranks.read_text().split()]
-        return sorted(found)
+        return ranks_of(self.job.pid)
 
     def leave(self, code=0):
         left = self.job.wait(timeout=120)

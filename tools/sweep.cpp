@@ -161,8 +161,15 @@ std::vector<int> parse_counts(const std::string& list, const std::string& option
                   fmt::format("{}: '{}' is not a number from 1 to {}", option, printable(item), kMaxRanks),
                   fmt::format("write it like {} 1,2,4,8", option));
     }
-    counts.push_back(value);
+    if (std::ranges::find(counts, value) == counts.end()) counts.push_back(value);
   }
+  return counts;
+}
+
+std::vector<int> powers_of_two_up_to(int max) {
+  std::vector<int> counts;
+  for (int count = 1; count < max; count *= 2) counts.push_back(count);
+  counts.push_back(max);
   return counts;
 }
 

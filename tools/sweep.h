@@ -130,8 +130,10 @@ inline constexpr int kMaxScreensASide = 256;
 
 /// "3x2", the value of `option`. Throws Error: Usage for what is no size, Limit past `max` a side.
 [[nodiscard]] Size parse_size(const std::string& text, const std::string& option, int max);
-/// "1,2,4,8", the value of `option`: numbers from 1 to the most ranks there may be. Throws Error (Usage).
+/// "1,2,4,8", the value of `option`: numbers from 1 to the most ranks there may be, each once. Throws Error (Usage).
 [[nodiscard]] std::vector<int> parse_counts(const std::string& list, const std::string& option);
+/// 1, 2, 4 .. and `max`.
+[[nodiscard]] std::vector<int> powers_of_two_up_to(int max);
 /// "3x2".
 [[nodiscard]] std::string grid_name(Size grid);
 /// "3x2@640x360": the wall shorthand of so many screens of that size.

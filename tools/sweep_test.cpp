@@ -84,5 +84,12 @@ TEST(MeasureCases, EndWhereOneStopsOrFails) {
   EXPECT_EQ(count(3, false), std::pair(true, std::size_t{4})) << "nothing was left";
 }
 
+TEST(Counts, AreTakenOnceInTheirOrder) {
+  EXPECT_EQ(parse_counts("4,2,4,2,1", "--ranks"), (std::vector{4, 2, 1}));
+  EXPECT_THROW((void)parse_counts("4,0", "--ranks"), Error);
+  EXPECT_EQ(powers_of_two_up_to(6), (std::vector{1, 2, 4, 6}));
+  EXPECT_EQ(powers_of_two_up_to(8), (std::vector{1, 2, 4, 8}));
+}
+
 }  // namespace
 }  // namespace hpr

@@ -337,7 +337,7 @@ WallJob make_wall_job(const WallRun& run, const Globals& globals) {
     return load_scene(source, settings, globals, [&](const Scene& scene) {
       const Camera camera =
           path ? camera_of(path->at_frame(0, static_cast<std::size_t>(frames))) : choose_camera(settings.camera, scene);
-      return wall_views(wall, camera, scene.bounds).front();
+      return wall_views(wall, camera, scene.bounds);
     });
   };
   if (run.display.remote()) {

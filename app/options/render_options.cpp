@@ -45,8 +45,8 @@ LoadedScene load_scene(const std::string& source, const RenderSettings& settings
 }
 
 LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
-                       const FirstView& view) {
-  return load_scene(source, settings, globals.scene_limits(), globals.picture_limits(), view);
+                       const FirstViews& views) {
+  return load_scene(source, settings, globals.scene_limits(), globals.picture_limits(), views);
 }
 
 }  // namespace hpr

@@ -30,6 +30,6 @@ struct ReportOptions {
 [[nodiscard]] LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
                                      Size size = kDefaultPictureSize);
 [[nodiscard]] LoadedScene load_scene(const std::string& source, const RenderSettings& settings, const Globals& globals,
-                                     const FirstView& view);
+                                     const FirstViews& views);
 
 }  // namespace hpr

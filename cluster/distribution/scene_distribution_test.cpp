@@ -15,6 +15,7 @@
 #include "cluster/transport/local_communicator.h"
 #include "cluster/transport/test_communicator.h"
 #include "core/error.h"
+#include "scene/pages/part_pages.h"
 #include "scene/partial_mesh.h"
 
 namespace hpr {
@@ -130,7 +131,7 @@ Scene large_scene() {
   Scene scene;
   scene.materials.resize(2);
   scene.materials[1].emissive = glm::vec3(1.0F);
-  scene.meshes = {grid(60, 0.0F), grid(40, 5.0F), grid(2, 9.0F)};
+  scene.meshes = {grid(300, 0.0F), grid(40, 5.0F), grid(2, 9.0F)};
   scene.meshes[2].material = 1;
   scene.instances.resize(4);
   scene.instances[1].mesh = 1;
@@ -187,7 +188,9 @@ TEST(DistributeScene, OneRankHoldsAllOfASceneThatWasReadInParts) {
       loaded.in_parts = true;
       const auto whole = std::make_shared<Scene>(loaded.scene);
       for (Mesh& mesh : loaded.scene.meshes) mesh = without_triangles(mesh);
-      loaded.whole_mesh = [whole](std::uint32_t mesh) { return whole->meshes.at(mesh); };
+      loaded.read_mesh = [whole](std::uint32_t mesh) {
+        return std::make_unique<WholeMeshReader>(&whole->meshes.at(mesh));
+      };
       return loaded;
     });
     EXPECT_FALSE(is_shared_out(scene));
@@ -209,7 +212,7 @@ TEST(DistributeScene, PartsThatNoRankMayHoldAreRefusedWithTheRanksThatCould) {
       (void)distribute_scene(comm, [&] { return load(bytes / 3); });
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ExitCode::Limit);
-      EXPECT_EQ(error.hint(), "use at least 4 ranks, or raise --limit-mem");
+      EXPECT_EQ(error.hint(), "use at least 4 ranks, keep pages of it on disk with --data paged, or raise --limit-mem");
       ++refused;
     }
   });
@@ -219,13 +222,63 @@ TEST(DistributeScene, PartsThatNoRankMayHoldAreRefusedWithTheRanksThatCould) {
   });
 }
 
+TEST(DistributeScene, PartsThatAreTooLargeGoPageByPageToTheDisk) {
+  const Scene whole = large_scene();
+  const std::uint64_t bytes = memory_of(whole);
+  for (const int size : {1, 2, 3}) {
+    std::mutex mutex;
+    std::vector<int> holders(whole.triangles, 0);
+    run_local_ranks(size, [&](Communicator& comm) {
+      Scene scene = distribute_scene(comm, [&] {
+        LoadedScene loaded(large_scene());
+        loaded.in_parts = loaded.in_pages = true;
+        loaded.memory_limit = 2 * bytes / (3 * static_cast<std::uint64_t>(size));
+        return loaded;
+      });
+      EXPECT_EQ(content_hash(scene), content_hash(whole));
+      EXPECT_LT(memory_of(scene), bytes / 50);
+      ASSERT_TRUE(scene.part_pages);
+      PartPages& pages = *scene.part_pages;
+      EXPECT_TRUE(pages.size() == 24 || pages.size() == 25) << pages.size();  // what all hold takes a little
+      EXPECT_GE(pages.max_resident(), 8U);                                    // sixteen of the same size would fit
+      EXPECT_LE(pages.max_resident() * pages.bytes_of_largest(), 2 * bytes / (3 * static_cast<std::uint64_t>(size)));
+      EXPECT_EQ(scene.pages.size(), pages.size() * static_cast<std::size_t>(size));
+      const std::lock_guard lock(mutex);
+      for (std::size_t page = 0; page < pages.size(); ++page) {
+        const PageInUse use(scene, page);
+        EXPECT_LT(memory_of(scene), bytes / static_cast<std::uint64_t>(size) / 8);
+        for (const SurfaceRange& range : surfaces_of_page(scene, page)) {
+          for (std::uint32_t id = range.first; id < range.last; ++id) {
+            ++holders[id];
+            const SurfaceLocation at = locate_surface(scene, id);
+            ASSERT_TRUE(scene.mesh_of(scene.instances[at.instance]).holds(at.triangle));
+          }
+        }
+      }
+    });
+    EXPECT_EQ(std::ranges::count(holders, 1), whole.triangles) << size;
+  }
+}
+
+TEST(DistributeScene, PagesAreForPartsThatDoNotFit) {
+  run_local_ranks(2, [&](Communicator& comm) {
+    const Scene scene = distribute_scene(comm, [&] {
+      LoadedScene loaded(large_scene());
+      loaded.in_parts = loaded.in_pages = true;
+      return loaded;
+    });
+    EXPECT_FALSE(scene.part_pages);
+    EXPECT_EQ(scene.parts.size(), 2U);
+  });
+}
+
 TEST(DistributeScene, AMeshThatCannotBeReadAgainIsAnErrorOnEveryRank) {
   expect_error_on_all(3, ExitCode::Io, "gone", [&](Communicator& comm) {
     (void)distribute_scene(comm, [&] {
       LoadedScene loaded(large_scene());
       loaded.in_parts = true;
       for (Mesh& mesh : loaded.scene.meshes) mesh = without_triangles(mesh);
-      loaded.whole_mesh = [](std::uint32_t) -> Mesh { throw Error(ExitCode::Io, "gone"); };
+      loaded.read_mesh = [](std::uint32_t) -> std::unique_ptr<MeshReader> { throw Error(ExitCode::Io, "gone"); };
       return loaded;
     });
   });

@@ -78,6 +78,9 @@ class Communicator {
   /// little shared memory.
   [[nodiscard]] virtual std::shared_ptr<PeerMemory> share(std::size_t bytes) = 0;
 
+  /// How long a wait for another rank may take before it counts as a hang.
+  [[nodiscard]] virtual std::chrono::nanoseconds hang_timeout() const = 0;
+
   /// A clock of this rank, in seconds since some moment: the machine's, or one that models another machine.
   [[nodiscard]] virtual double seconds() const;
   /// Whether that clock is a model. Work must then be shared by rule, not by who is free.

@@ -33,6 +33,7 @@ class ForwardingCommunicator : public Communicator {
     return inner_->subset(members);
   }
   [[nodiscard]] std::shared_ptr<PeerMemory> share(std::size_t bytes) override { return inner_->share(bytes); }
+  [[nodiscard]] std::chrono::nanoseconds hang_timeout() const override { return inner_->hang_timeout(); }
   [[nodiscard]] double seconds() const override { return inner_->seconds(); }
   [[nodiscard]] bool models_time() const override { return inner_->models_time(); }
   void worked(std::size_t bytes) override { inner_->worked(bytes); }

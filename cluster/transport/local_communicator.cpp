@@ -60,6 +60,7 @@ class PostOffice {
   explicit PostOffice(const LocalRanks& ranks) : ranks_(ranks), hang_timeout_(std::min(ranks.hang_timeout, kMaxWait)) {}
 
   [[nodiscard]] const LocalRanks& ranks() const { return ranks_; }
+  [[nodiscard]] std::chrono::nanoseconds hang_timeout() const { return hang_timeout_; }
 
   void put(const Route& route, Message message) {
     const std::lock_guard lock(mutex_);
@@ -230,6 +231,7 @@ class LocalCommunicator final : public Communicator {
   [[nodiscard]] int rank() const override { return rank_; }
   [[nodiscard]] int size() const override { return size_; }
   [[nodiscard]] std::string_view transport() const override { return "threads"; }
+  [[nodiscard]] std::chrono::nanoseconds hang_timeout() const override { return office_.hang_timeout(); }
   void begin_frame(std::uint64_t frame) override { *frame_ = frame; }
 
   void send(std::span<const std::byte> message, int to) override { put(channel_, message, to); }

@@ -55,9 +55,32 @@ std::uint64_t free_shared_memory() {
   return static_cast<std::uint64_t>(there.f_bavail) * there.f_frsize;
 }
 
+/// Collective. Whether the ranks of this host outnumber the cores that the system lets any of them run on.
+bool ranks_outnumber_cores(MPI_Comm comm) {
+  MPI_Comm host = MPI_COMM_NULL;
+  check_mpi(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host), "MPI_Comm_split_type");
+  int ranks = 0;
+  check_mpi(MPI_Comm_size(host, &ranks), "MPI_Comm_size");
+  std::array<cpu_set_t, 2> cores{};  // of this rank, of all ranks of the host
+  for (cpu_set_t& set : cores) CPU_ZERO(&set);
+  const bool is_known = sched_getaffinity(0, sizeof(cpu_set_t), cores.data()) == 0;
+  check_mpi(MPI_Allreduce(cores.data(), cores.data() + 1, sizeof(cpu_set_t), MPI_BYTE, MPI_BOR, host), "MPI_Allreduce");
+  MPI_Comm_free(&host);
+  return is_known && CPU_COUNT(&cores[1]) < ranks;
+}
+
 constexpr std::uint64_t kMinTags = 32768;  ///< that any MPI has
 
 constexpr int kPopulateWrite = 23;  ///< MADV_POPULATE_WRITE of Linux 5.14, which older headers lack
+
+/// Whom a rank waits for in a call that needs all ranks of a communicator.
+int awaited_in(MPI_Comm comm) {
+  int rank = 0;
+  int size = 1;
+  check_mpi(MPI_Comm_rank(comm, &rank), "MPI_Comm_rank");
+  check_mpi(MPI_Comm_size(comm, &size), "MPI_Comm_size");
+  return size == 2 ? 1 - rank : kOtherRanks;
+}
 
 /// One MPI-3 shared window per host: every rank of the host has a zeroed part of it. Constructing it is collective over
 /// `comm`, and whoever reads what another rank was given waits for all ranks to have returned. Throws Error (Limit)
@@ -66,7 +89,8 @@ class WindowMemory final : public PeerMemory {
  public:
   WindowMemory(MPI_Comm comm, std::size_t bytes, std::chrono::nanoseconds hang_timeout,
                std::shared_ptr<const std::uint64_t> frame)
-      : hang_timeout_(hang_timeout), frame_(std::move(frame)) {
+      : hang_timeout_(hang_timeout), frame_(std::move(frame)), awaited_(awaited_in(comm)) {
+    const WaitReport wait(awaited_);
     check_mpi(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host_), "MPI_Comm_split_type");
     check_mpi(MPI_Comm_size(host_, &ranks_here_), "MPI_Comm_size");
     MPI_Info info = MPI_INFO_NULL;
@@ -89,6 +113,7 @@ class WindowMemory final : public PeerMemory {
   ~WindowMemory() override {
     // Freeing is collective: after a failure the peers may never come, and the job ends anyway.
     if (std::uncaught_exceptions() != exceptions_at_birth_) return;
+    const WaitReport wait(awaited_);
     MPI_Win_unlock_all(window_);
     MPI_Win_free(&window_);
     MPI_Comm_free(&host_);
@@ -139,8 +164,10 @@ class WindowMemory final : public PeerMemory {
     const auto deadline = std::chrono::steady_clock::now() + hang_timeout_;
     // Ranks that have a core each come soon; falling asleep and being woken would take longer than that.
     const int spins = static_cast<unsigned>(ranks_here_) <= std::thread::hardware_concurrency() ? 20'000 : 0;
-    for (int tries = 0; round.load() == now; ++tries) {
-      if (tries < spins) continue;
+    int tries = 0;
+    while (round.load() == now && tries < spins) ++tries;
+    const WaitReport wait(awaited_);
+    while (round.load() == now) {
       const timespec limit{.tv_sec = 1, .tv_nsec = 0};
       futex(FUTEX_WAIT, static_cast<int>(now), &limit);
       if (std::chrono::steady_clock::now() > deadline) {
@@ -200,6 +227,7 @@ class WindowMemory final : public PeerMemory {
   Meeting* own_ = nullptr;
   int rank_ = 0;
   std::shared_ptr<const std::uint64_t> frame_;
+  int awaited_ = kOtherRanks;  ///< in meetings
   int exceptions_at_birth_ = std::uncaught_exceptions();
 };
 
@@ -213,11 +241,15 @@ MpiCommunicator::MpiCommunicator(MPI_Comm parent, std::chrono::nanoseconds hang_
             check_mpi(MPI_Comm_dup(parent, &copy), "MPI_Comm_dup");
             return copy;
           }(),
-          hang_timeout, part_bytes, std::make_shared<std::uint64_t>(0)) {}
+          hang_timeout, part_bytes, std::make_shared<std::uint64_t>(0), ranks_outnumber_cores(parent)) {}
 
 MpiCommunicator::MpiCommunicator(Owned /*tag*/, MPI_Comm comm, std::chrono::nanoseconds hang_timeout,
-                                 std::size_t part_bytes, std::shared_ptr<std::uint64_t> frame)
-    : comm_(comm), hang_timeout_(std::min(hang_timeout, kMaxWait)), part_bytes_(part_bytes), frame_(std::move(frame)) {
+                                 std::size_t part_bytes, std::shared_ptr<std::uint64_t> frame, bool is_crowded)
+    : comm_(comm),
+      hang_timeout_(std::min(hang_timeout, kMaxWait)),
+      part_bytes_(part_bytes),
+      frame_(std::move(frame)),
+      is_crowded_(is_crowded) {
   HPR_CHECK(part_bytes_ > 0 && part_bytes_ % sizeof(std::uint64_t) == 0 && part_bytes_ <= kMaxPartBytes);
   check_mpi(MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
   check_mpi(MPI_Comm_rank(comm_, &rank_), "MPI_Comm_rank");
@@ -246,12 +278,19 @@ MpiCommunicator::~MpiCommunicator() {
 template <typename Done>
 void MpiCommunicator::poll(Done done, std::string_view doing, int peer) {
   constexpr std::chrono::milliseconds kWorthTelling{100};
+  constexpr unsigned kSpins = 64;
+  constexpr unsigned kLooksAwake = 128;
   const auto begin = std::chrono::steady_clock::now();
   bool reported = false;
   for (unsigned tries = 0; !done(); ++tries) {
-    // Ranks may outnumber cores: after a short spin each failed look gives the core away.
-    if (tries < 64) continue;
-    sched_yield();
+    // Other threads may want the core: after a short spin each failed look gives it away. A rank that keeps looking
+    // still takes half of it where ranks share one, so these sleep.
+    if (tries < kSpins) continue;
+    if (is_crowded_ && tries >= kLooksAwake) {
+      std::this_thread::sleep_for(std::chrono::microseconds{10});
+    } else {
+      sched_yield();
+    }
     if (tries % 256 != 0) continue;
     const auto waited = std::chrono::steady_clock::now() - begin;
     if (!reported && waited > kWorthTelling) {
@@ -438,10 +477,14 @@ std::unique_ptr<Communicator> MpiCommunicator::subset(std::span<const int> membe
   MPI_Comm comm = MPI_COMM_NULL;
   check_mpi(MPI_Comm_group(comm_, &all), "MPI_Comm_group");
   check_mpi(MPI_Group_incl(all, static_cast<int>(members.size()), members.data(), &some), "MPI_Group_incl");
-  check_mpi(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
+  {
+    const WaitReport wait(members.size() == 2 ? members[members[0] == rank_ ? 1 : 0] : kOtherRanks);
+    check_mpi(MPI_Comm_create_group(comm_, some, members.front(), &comm), "MPI_Comm_create_group");
+  }
   MPI_Group_free(&some);
   MPI_Group_free(&all);
-  return std::unique_ptr<Communicator>(new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_, frame_));
+  return std::unique_ptr<Communicator>(
+      new MpiCommunicator(Owned{}, comm, hang_timeout_, part_bytes_, frame_, is_crowded_));
 }
 
 std::shared_ptr<PeerMemory> MpiCommunicator::share(std::size_t bytes) {

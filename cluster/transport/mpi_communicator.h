@@ -40,6 +40,7 @@ class MpiCommunicator final : public Communicator {
   void reduce_max(std::span<std::uint64_t> values, int root) override;
   [[nodiscard]] std::unique_ptr<Communicator> subset(std::span<const int> members) override;
   [[nodiscard]] std::shared_ptr<PeerMemory> share(std::size_t bytes) override;
+  [[nodiscard]] std::chrono::nanoseconds hang_timeout() const override { return hang_timeout_; }
 
  private:
   /// A message on its way to this rank.
@@ -53,7 +54,7 @@ class MpiCommunicator final : public Communicator {
   bool advance(Incoming& incoming);
   struct Owned {};  ///< tag: `comm` becomes ours, no duplicate is made
   MpiCommunicator(Owned, MPI_Comm comm, std::chrono::nanoseconds hang_timeout, std::size_t part_bytes,
-                  std::shared_ptr<std::uint64_t> frame);
+                  std::shared_ptr<std::uint64_t> frame, bool is_crowded);
 
   /// What this rank's messages are tagged with: its frame, in as many numbers as MPI has.
   [[nodiscard]] int tag() const { return static_cast<int>(*frame_ % tags_); }
@@ -78,6 +79,7 @@ class MpiCommunicator final : public Communicator {
   std::size_t part_bytes_;
   std::uint64_t tags_ = 1;                       ///< that MPI has
   std::shared_ptr<std::uint64_t> frame_;         ///< one for all communicators of this rank
+  bool is_crowded_;                              ///< ranks of this host outnumber the cores they run on
   bool abandoned_ = false;                       ///< a wait was given up with requests under way
   std::vector<std::unique_ptr<Incoming>> idle_;  ///< memory of messages that have come, for the next ones
 };

@@ -192,15 +192,20 @@ class Model {
     light_evenly(owners);
   }
 
-  void draw_parts(const std::vector<std::vector<int>>& members, const std::vector<int>& areas, int largest) {
-    const auto partition = partition_chunks(load_.objects, largest);
-    std::vector<std::pair<std::uint32_t, int>> part_of;  // first surface, part
+  /// Per first surface of a range the part of the objects that it belongs to.
+  [[nodiscard]] std::vector<std::pair<std::uint32_t, int>> parts_of_surfaces(int parts) const {
+    const auto partition = partition_chunks(load_.objects, parts);
+    std::vector<std::pair<std::uint32_t, int>> part_of;
     for (std::size_t part = 0; part < partition.size(); ++part) {
       for (const SurfaceRange& range : partition[part]) part_of.emplace_back(range.first, static_cast<int>(part));
     }
     std::ranges::sort(part_of);
-    // Per tile and part about how many pixels it draws there.
-    std::vector<std::vector<std::pair<int, double>>> layers(load_.layout.tiles());
+    return part_of;
+  }
+
+  void draw_parts(const std::vector<std::vector<int>>& members, const std::vector<int>& areas, int largest) {
+    const auto part_of = parts_of_surfaces(largest);
+    std::vector<DrawnLayers> layers(load_.layout.tiles());
     std::vector<Rect> bounds(work_.draw.size() * load_.layout.screens());
     std::vector<int> touched;
     std::vector<double> parts(members.size(), 0.0);
@@ -213,13 +218,7 @@ class Model {
         auto& of_group = parts[static_cast<std::size_t>(areas[tile])];
         if (of_group == 0.0) touched.push_back(areas[tile]);
         of_group += fraction;
-        auto& here = layers[tile];
-        const auto same = std::ranges::find(here, part, &std::pair<int, double>::first);
-        if (same == here.end()) {
-          here.emplace_back(part, chunk.covered * fraction);
-        } else {
-          same->second += chunk.covered * fraction;
-        }
+        add_layer(layers[tile], part, chunk.covered * fraction);
       });
       for (const int group : touched) {
         const auto& of_group = members[static_cast<std::size_t>(group)];
@@ -239,7 +238,24 @@ class Model {
       if (bounds[i].empty()) continue;
       work_.draw[rank] += read_of(bounds[i]) / static_cast<double>(members.size()) + speeds_.raster.draw;
     }
-    for (double& draw : work_.draw) draw += static_cast<double>(load_.objects.size()) / largest * speeds_.chunk;
+    for (double& draw : work_.draw) draw += bounding_ns() / largest;
+    merge_layers(layers, members, areas);
+  }
+
+  /// Per part of the objects about how many pixels of a tile it draws.
+  using DrawnLayers = std::vector<std::pair<int, double>>;
+
+  static void add_layer(DrawnLayers& layers, int part, double pixels) {
+    const auto same = std::ranges::find(layers, part, &std::pair<int, double>::first);
+    if (same == layers.end()) {
+      layers.emplace_back(part, pixels);
+    } else {
+      same->second += pixels;
+    }
+  }
+
+  void merge_layers(std::span<const DrawnLayers> layers, const std::vector<std::vector<int>>& members,
+                    const std::vector<int>& areas) {
     double touched_tiles = 0.0;
     double layers_in_all = 0.0;
     for (std::size_t tile = 0; tile < layers.size(); ++tile) {
@@ -260,8 +276,9 @@ class Model {
                    double pixels) {
     const auto& of_group = members[static_cast<std::size_t>(areas[tile])];
     if (of_group.size() == 1) return;
+    const double merge = ranks_ <= speeds_.host_ranks ? speeds_.merge_in_place : speeds_.merge;
     for (const int rank : of_group) {
-      work_.composite[static_cast<std::size_t>(rank)] += pixels * speeds_.merge / static_cast<double>(of_group.size());
+      work_.composite[static_cast<std::size_t>(rank)] += pixels * merge / static_cast<double>(of_group.size());
     }
     rounds_ = std::max(rounds_, 2.0 * std::ceil(std::log2(static_cast<double>(of_group.size()))));
   }
@@ -294,7 +311,7 @@ class Model {
     work_.overlap = groups.overlap;
     // Every rank bounds some of the chunks, and groups all.
     const auto chunks = static_cast<double>(load_.chunks.size());
-    work_.prepare += static_cast<double>(load_.objects.size()) / ranks_ * speeds_.chunk +
+    work_.prepare += bounding_ns() / ranks_ +
                      chunks * (speeds_.group + static_cast<double>(sizeof(ScreenChunk)) / sizeof(Key) * speeds_.merge) +
                      ranks_ * 100.0 + std::ceil(std::log2(ranks_)) * speeds_.message;
     light_evenly(groups.owners);
@@ -311,6 +328,10 @@ class Model {
     }
   }
 
+  /// All chunks on every screen.
+  [[nodiscard]] double bounding_ns() const {
+    return static_cast<double>(load_.objects.size() * load_.layout.screens()) * speeds_.chunk;
+  }
   [[nodiscard]] double read_of(const Rect& pixels) const {
     return static_cast<double>(pixels.area()) * speeds_.raster.read;
   }
@@ -335,12 +356,25 @@ class Model {
     prediction.composite_ms = phase_ms(work_.composite) + 1e-6 * (ranks_ > 1 ? rounds_ : 0.0) * speeds_.message;
     prediction.light_ms = phase_ms(work_.light);
     prediction.prepare_ms = 1e-6 * work_.prepare;
+    prediction.show_ms = 1e-6 * showing_ns();
     std::vector<double> both;
     for (std::size_t rank = 0; rank < work_.draw.size(); ++rank) both.push_back(work_.draw[rank] + work_.light[rank]);
     prediction.imbalance = slowest_over_mean(both);
     prediction.overlap = work_.overlap;
     prediction.drawn_ns = sum_of(both);
     return prediction;
+  }
+
+  /// Each rank finishes about as many pixels; those who show them get what others have, one after the other.
+  [[nodiscard]] double showing_ns() const {
+    double pixels = 0.0;
+    for (std::size_t tile = 0; tile < light_.size(); ++tile) {
+      pixels += static_cast<double>(load_.layout.place(tile).pixels.area());
+    }
+    const double finishing = pixels * speeds_.finish / ranks_;
+    if (ranks_ == 1) return finishing;
+    const double others = 1.0 - 1.0 / ranks_;
+    return finishing + pixels / std::min(load_.writers, ranks_) * others * speeds_.collect + speeds_.message;
   }
 
   const FrameLoad& load_;
@@ -377,6 +411,17 @@ FramePrediction predict_frame(Distribution distribution, const FrameLoad& load, 
 
 double efficiency(const FramePrediction& one_rank, const FramePrediction& prediction, int ranks) {
   return one_rank.total_ms() / (ranks * prediction.total_ms());
+}
+
+FrameLimit limit_of(const FramePrediction& one_rank, const FramePrediction& prediction, int ranks) {
+  constexpr double kMinPart = 0.005;
+  FrameLimit limit{kFramePhases.data(), 0.0};
+  if (prediction.total_ms() <= 0.0) return limit;
+  for (const FramePhase& phase : kFramePhases) {
+    const double lost = prediction.*phase.ms - one_rank.*phase.ms / ranks;
+    if (lost / prediction.total_ms() > std::max(limit.part, kMinPart)) limit = {&phase, lost / prediction.total_ms()};
+  }
+  return limit;
 }
 
 }  // namespace hpr

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -7,32 +8,13 @@
 
 #include "cluster/distribution/assignment.h"
 #include "cluster/distribution/view_groups.h"
+#include "engine/balance/machine_speeds.h"
 #include "image/tiles.h"
-#include "raster/raster_speed.h"
 
 namespace hpr {
 
 class Session;
 struct View;
-
-/// How fast ranks work while all of them do, in nanoseconds of a rank's time.
-struct MachineSpeeds {
-  RasterSpeed raster{.triangle = 100.0, .pixel = 1.5, .read = 0.6, .draw = 3e4};
-  double ray = 100.0;     ///< that makes a key
-  double build = 350.0;   ///< a triangle of Embree's scene
-  double light = 300.0;   ///< a visible pixel
-  double merge = 8.0;     ///< a pixel sent to another rank and merged there
-  double message = 2e4;   ///< a small message in flight
-  double post = 2e3;      ///< a message more of many at once
-  double chunk = 150.0;   ///< a chunk bounded
-  double group = 35.0;    ///< a chunk grouped, where the view has moved a little
-  double crowding = 1.0;  ///< threads of all ranks by cores, at least 1: a rank that is alone is so much faster
-  int host_ranks = 1;     ///< ranks of a host, which light tiles of each other
-
-  [[nodiscard]] DrawSpeeds draw_speeds() const {
-    return {.triangle = raster.triangle, .pixel = raster.pixel + raster.read, .merge = merge, .light = light};
-  }
-};
 
 /// What a frame has to draw, however it is shared out.
 struct FrameLoad {
@@ -42,6 +24,7 @@ struct FrameLoad {
   std::vector<double> light_ns;       ///< per tile; empty: what is in view, by MachineSpeeds::light
   bool by_rays = false;               ///< whether rays make the keys
   std::uint64_t built_triangles = 0;  ///< of the Embree scene that rays need for keys alone
+  int writers = 1;                    ///< ranks that show screens
   double frames = 8.0;                ///< among which what is done once is shared out
 };
 
@@ -55,12 +38,23 @@ struct FramePrediction {
   double composite_ms = 0.0;  ///< sending and merging them
   double light_ms = 0.0;
   double prepare_ms = 0.0;  ///< a frame's part of what is done once, and grouping
+  double show_ms = 0.0;     ///< sums, exposure, tiles to screens
   double imbalance = 1.0;   ///< of drawing and light, the slowest rank by the mean
   double overlap = 1.0;     ///< ranks that draw into a tile, of tiles that any draws into
   double drawn_ns = 0.0;    ///< by all ranks together, light included
 
-  [[nodiscard]] double total_ms() const { return draw_ms + composite_ms + light_ms + prepare_ms; }
+  [[nodiscard]] double total_ms() const { return draw_ms + composite_ms + light_ms + prepare_ms + show_ms; }
 };
+
+/// The phases that a frame's time is the sum of, with their names for people.
+struct FramePhase {
+  const char* name;
+  double FramePrediction::*ms;
+};
+inline constexpr std::array kFramePhases{
+    FramePhase{"drawing", &FramePrediction::draw_ms}, FramePhase{"compositing", &FramePrediction::composite_ms},
+    FramePhase{"light", &FramePrediction::light_ms}, FramePhase{"grouping and building", &FramePrediction::prepare_ms},
+    FramePhase{"tiles to screens", &FramePrediction::show_ms}};
 
 /// Predicts a frame by so many ranks, which may be more than there are. `groups`: of Hybrid; 0: by view where OpenGL
 /// draws, else default_groups(). Every rank has one part in each phase, and the slowest one's is what the phase takes.
@@ -70,5 +64,13 @@ struct FramePrediction {
 
 /// How much of `ranks` times one rank's speed a frame has.
 [[nodiscard]] double efficiency(const FramePrediction& one_rank, const FramePrediction& prediction, int ranks);
+
+/// The phase in which a frame by `ranks` loses most against its part of what it takes one rank, and how much of the
+/// frame that is.
+struct FrameLimit {
+  const FramePhase* phase = nullptr;
+  double part = 0.0;
+};
+[[nodiscard]] FrameLimit limit_of(const FramePrediction& one_rank, const FramePrediction& prediction, int ranks);
 
 }  // namespace hpr

@@ -33,9 +33,11 @@ std::vector<FrameLoad> loads_of(const std::string& scene, Size size) {
   return loads;
 }
 
+/// Of ranks that each show their part of a wall.
 double mean_efficiency(const std::vector<FrameLoad>& loads, Distribution distribution, int ranks) {
   double sum = 0.0;
-  for (const FrameLoad& load : loads) {
+  for (FrameLoad load : loads) {
+    load.writers = ranks;
     const FramePrediction one = predict_frame(Distribution::SortFirst, load, {}, 1);
     sum += efficiency(one, predict_frame(distribution, load, {}, ranks), ranks);
   }
@@ -61,9 +63,11 @@ TEST(FrameModel, OnManyRanksHybridIsMostEfficientAndNoSlowerOnMore) {
   EXPECT_GT(hybrid, 0.8);
   EXPECT_GT(hybrid, mean_efficiency(loads, Distribution::SortFirst, 64));
   EXPECT_GT(hybrid, mean_efficiency(loads, Distribution::SortLast, 64));
-  double before = predict_frame(Distribution::Hybrid, loads.front(), {}, 1).total_ms();
+  FrameLoad load = loads.front();
+  double before = predict_frame(Distribution::Hybrid, load, {}, 1).total_ms();
   for (int ranks = 2; ranks <= 1024; ranks *= 2) {
-    const double now = predict_frame(Distribution::Hybrid, loads.front(), {}, ranks).total_ms();
+    load.writers = ranks;
+    const double now = predict_frame(Distribution::Hybrid, load, {}, ranks).total_ms();
     EXPECT_LT(now, 1.02 * before) << ranks;
     before = now;
   }
@@ -82,6 +86,35 @@ TEST(FrameModel, WhereTrianglesAreDearWhoDrawsThemOnceWinsAndWhereMergingIsWhoMe
     EXPECT_LT(ms(Distribution::SortFirst, dear_merging), ms(Distribution::SortLast, dear_merging));
     EXPECT_GT(ms(Distribution::SortFirst, dear_triangles), ms(Distribution::SortLast, dear_triangles));
   }
+}
+
+TEST(FrameModel, NamesWhatLimits) {
+  const FrameLoad load = loads_of("gen:sphereflake?s=3", {640, 480}).front();
+  const auto limit = [&](Distribution distribution, const MachineSpeeds& speeds, int ranks) {
+    const FramePrediction one = predict_frame(Distribution::SortFirst, load, speeds, 1);
+    const FrameLimit found = limit_of(one, predict_frame(distribution, load, speeds, ranks), ranks);
+    EXPECT_GT(found.part, 0.0);
+    EXPECT_LT(found.part, 1.0);
+    return std::string(found.phase->name);
+  };
+  MachineSpeeds dear_merging;
+  dear_merging.merge = 1e4;
+  EXPECT_EQ(limit(Distribution::SortLast, dear_merging, 16), "compositing");
+  MachineSpeeds dear_triangles;
+  dear_triangles.raster.triangle = 1e4;  // few tiles have them all
+  EXPECT_EQ(limit(Distribution::SortFirst, dear_triangles, 16), "drawing");
+  MachineSpeeds slow_link;
+  slow_link.collect = 1e3;
+  EXPECT_EQ(limit(Distribution::Hybrid, slow_link, 16), "tiles to screens");
+}
+
+TEST(FrameModel, ScreensOfSeveralRanksAreFilledTogether) {
+  FrameLoad load = loads_of("gen:gallery?s=1", {320, 200}).front();
+  const FramePrediction one_writer = predict_frame(Distribution::SortFirst, load, {}, 8);
+  load.writers = 2;
+  const FramePrediction two = predict_frame(Distribution::SortFirst, load, {}, 8);
+  const double pixels = 320.0 * 200.0;
+  EXPECT_NEAR(one_writer.show_ms - two.show_ms, 1e-6 * pixels / 2.0 * 7.0 / 8.0 * MachineSpeeds().collect, 1e-9);
 }
 
 TEST(FrameModel, RanksThatCrowdTheCoresGainNothing) {

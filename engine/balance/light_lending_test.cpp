@@ -36,7 +36,7 @@ View view_of(const Scene& scene) {
 const TileLayer<Key>& whole_keys() {
   static const TileLayer<Key> keys = [] {
     const Scene& scene = cornell();
-    const RayScene rays(scene, RaySpace(scene.bounds), 2);
+    const RayScene rays(scene, RaySpace(scene), 2);
     const View view = view_of(scene);
     TileLayer<Key> layer(FrameLayout({view.size()}));
     PrimaryRays(scene, rays, 2).draw(view, 0, std::vector<Rect>{view.block}, layer);

@@ -106,8 +106,7 @@ std::vector<double> estimate_costs(Session& session, const FramePlan& plan, std:
 /// Whether a frame has a scene for rays, however it is balanced.
 bool has_ray_scene(Session& session, const FramePlan& plan) {
   if (plan.primary == Primary::Rays || plan.rays.reference || traces_own_rays(plan.rays.show)) return true;
-  return needs_light(plan.rays.show) && std::ranges::any_of(plan_passes(session.requirements(), plan.rays),
-                                                            [](const PassPlan& pass) { return pass.runs; });
+  return needs_light(plan.rays.show) && traces_rays_beside_keys(session.requirements(), plan.rays);
 }
 
 }  // namespace
@@ -123,6 +122,19 @@ void LoadBalance::forget() {
   light_spent_.clear();
   costs_.clear();
   light_costs_.clear();
+}
+
+const MachineSpeeds& LoadBalance::speeds(Session& session, bool by_raster) {
+  if (!speeds_ || (by_raster && !raster_measured_)) {
+    speeds_ = measure_speeds(session, by_raster);
+    raster_measured_ = by_raster;
+  }
+  return *speeds_;
+}
+
+void LoadBalance::set_speeds(const MachineSpeeds& speeds) {
+  speeds_ = speeds;
+  raster_measured_ = true;
 }
 
 void LoadBalance::start_frame(const FrameLayout& layout) {

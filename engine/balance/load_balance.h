@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "cluster/distribution/balance.h"
 #include "engine/balance/light_lending.h"
+#include "engine/balance/machine_speeds.h"
 #include "image/tiles.h"
 #include "rt/ray_counts.h"
 
@@ -47,6 +49,12 @@ class LoadBalance {
 
   [[nodiscard]] LightLending& lending() { return lending_; }
 
+  /// Collective. How fast this session's ranks are, measured when first asked for; OpenGL too, where `by_raster` and it
+  /// runs.
+  [[nodiscard]] const MachineSpeeds& speeds(Session& session, bool by_raster);
+  /// Has these speeds in place of measured ones, on all ranks.
+  void set_speeds(const MachineSpeeds& speeds);
+
  private:
   FrameLayout layout_;
   std::vector<double> keys_spent_;  ///< by this rank, on each tile of the frame at hand
@@ -54,6 +62,8 @@ class LoadBalance {
   TileCosts costs_;
   TileCosts light_costs_;
   LightLending lending_;
+  std::optional<MachineSpeeds> speeds_;
+  bool raster_measured_ = false;  ///< whether speeds_ has OpenGL's
 };
 
 /// About what the light of a tile costs, as far as its keys tell.

@@ -41,9 +41,9 @@ const auto& member(const Settings& settings, At at) {
 /// A value that is written in a way of its own: `parse` makes a value of text, `write` text of a value. `at` returns a
 /// reference to where it is.
 template <typename At, typename Parse, typename Write>
-SettingValue text(std::string type, std::string takes, At at, Parse parse, Write write) {
-  return {.type = std::move(type),
-          .takes = std::move(takes),
+SettingValue text(const std::string& type, const std::string& takes, At at, Parse parse, Write write) {
+  return {.type = type,
+          .takes = takes,
           .parse = [=](Settings& settings, const std::string& written) { at(settings) = parse(written); },
           .write = [=](const Settings& settings) -> std::string { return write(member(settings, at)); },
           .copy = [=](const Settings& from, Settings& to) { at(to) = member(from, at); }};
@@ -51,14 +51,14 @@ SettingValue text(std::string type, std::string takes, At at, Parse parse, Write
 
 /// A text that stands for itself.
 template <typename At>
-SettingValue plain_text(std::string type, std::string takes, At at) {
+SettingValue plain_text(const std::string& type, const std::string& takes, At at) {
   const auto same = [](const std::string& written) { return written; };
-  return text(std::move(type), std::move(takes), at, same, same);
+  return text(type, takes, at, same, same);
 }
 
 /// A number from `low` to `high`, both included; a default outside of them stands for a choice that is left open.
 template <typename Number, typename At>
-SettingValue number(Number low, Number high, At at, std::string takes = {}) {
+SettingValue number(Number low, Number high, At at, const std::string& takes = {}) {
   constexpr bool kReal = std::is_floating_point_v<Number>;
   const std::string range = kReal ? fmt::format("{:g} to {:g}", static_cast<double>(low), static_cast<double>(high))
                                   : fmt::format("{} to {}", low, high);
@@ -69,7 +69,7 @@ SettingValue number(Number low, Number high, At at, std::string takes = {}) {
     throw Error(ExitCode::Usage, fmt::format("'{}' is no number from {}", printable(written), range),
                 fmt::format("write one from {}", range));
   };
-  return text(fmt::format("{} {}", kReal ? "FLOAT" : "INT", range), takes.empty() ? range : std::move(takes), at, parse,
+  return text(fmt::format("{} {}", kReal ? "FLOAT" : "INT", range), takes.empty() ? range : takes, at, parse,
               [=](Number value) { return value >= low && value <= high ? fmt::format("{}", value) : std::string(); });
 }
 

@@ -13,6 +13,8 @@
 #include "engine/settings/test_frames.h"
 #include "engine/wall/scene_edits.h"
 #include "scene/load_scene.h"
+#include "scene/pages/part_pages.h"
+#include "scene/partial_mesh.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -35,14 +37,26 @@ void add_frame(Session& session, const RenderSettings& settings, std::vector<Rgb
   test::add_pixels(session, maker, *frame, frame->radiance, pixels);
 }
 
+/// Leaves each of so many ranks room for two thirds of its part of what ranks do not all hold.
+void limit_to_pages(LoadedScene& loaded, int ranks) {
+  if (!loaded.in_pages) return;
+  std::uint64_t shared = 0;
+  for (const Mesh& mesh : loaded.scene.meshes) shared += is_held_by_all(loaded.scene, mesh) ? 0 : memory_of(mesh);
+  const std::uint64_t held_by_all = whole_memory_of(loaded.scene) - shared;
+  loaded.memory_limit = held_by_all + 2 * shared / (3 * static_cast<std::uint64_t>(ranks)) + 4096;
+}
+
 /// The bits of a frame, of one after a node moved, and of one without another node.
 std::vector<Rgb> draw(int ranks, const std::string& scene, const Options& options) {
   std::vector<Rgb> pixels;
   run_local_ranks({.size = ranks, .hang_timeout = 60s, .disorder = 3}, [&](Communicator& comm) {
     const RenderSettings settings = settings_with(options);
     Session session(comm, {.threads = 1}, [&] {
-      return load_scene(scene, settings, {}, {}, first_view(settings, {100, 70}));
+      LoadedScene loaded = load_scene(scene, settings, {}, {}, first_view(settings, {100, 70}));
+      limit_to_pages(loaded, ranks);
+      return loaded;
     });
+    EXPECT_EQ(session.scene().part_pages != nullptr, settings.frame.data == SceneData::Paged);
     add_frame(session, settings, pixels);
     SceneEdits edits(session.scene());
     const auto change = [&] { session.change_scene([&](Scene& changed) { edits.apply(changed); }); };
@@ -75,6 +89,14 @@ TEST_P(EditedPartsTest, FramesHaveTheBitsOfAWholeScene) {
   ASSERT_FALSE(expected.empty());
   for (const int ranks : {2, 7}) {
     EXPECT_TRUE(draw(ranks, scene, options_with({{"data", "partitioned"}})) == expected) << ranks;
+  }
+}
+
+TEST_P(EditedPartsTest, PagesOfAPartAreDrawnOneByOne) {
+  const std::string& scene = std::get<0>(GetParam());
+  const std::vector<Rgb> expected = draw(1, scene, options_with({}));
+  for (const int ranks : {1, 3}) {
+    EXPECT_TRUE(draw(ranks, scene, options_with({{"data", "paged"}})) == expected) << ranks;
   }
 }
 

@@ -42,6 +42,7 @@ SceneEdits::SceneEdits(const Scene& scene) : instances_(scene.instances) {
     nodes_[found->second].instances.push_back(i);
   }
   for (const std::vector<SurfaceRange>& part : scene.parts) parts_.push_back(split_by_instance(scene, part));
+  for (const std::vector<SurfaceRange>& page : scene.pages) pages_.push_back(split_by_instance(scene, page));
   for (const Light& light : scene.lights) {
     lights_.push_back({light, true});
     if (light.name.empty()) lights_.back().light.name = fmt::format("light{}", lights_.size() - 1);
@@ -128,19 +129,21 @@ void SceneEdits::apply(Scene& scene) const {
     if (edited.on) scene.lights.push_back(edited.light);
   }
   finish_scene(scene);
-  if (!parts_.empty()) scene.parts = renumbered_parts(scene, hidden);
+  scene.parts = renumbered(parts_, scene, hidden);
+  scene.pages = renumbered(pages_, scene, hidden);
 }
 
 /// The parts of a scene that is shared out, by the numbers that surfaces have once some instances are hidden.
-std::vector<std::vector<SurfaceRange>> SceneEdits::renumbered_parts(const Scene& scene,
-                                                                    const std::vector<bool>& hidden) const {
+std::vector<std::vector<SurfaceRange>> SceneEdits::renumbered(const std::vector<std::vector<InstanceRange>>& old_parts,
+                                                              const Scene& scene,
+                                                              const std::vector<bool>& hidden) const {
   std::vector<std::uint32_t> now(instances_.size(), 0);
   for (std::size_t i = 0, next = 0; i < instances_.size(); ++i) {
     if (!hidden[i]) now[i] = scene.instances[next++].first_surface;
   }
-  std::vector<std::vector<SurfaceRange>> parts(parts_.size());
+  std::vector<std::vector<SurfaceRange>> parts(old_parts.size());
   for (std::size_t rank = 0; rank < parts.size(); ++rank) {
-    for (const InstanceRange& range : parts_[rank]) {
+    for (const InstanceRange& range : old_parts[rank]) {
       if (hidden[range.instance]) continue;
       const std::uint32_t first = now[range.instance];
       parts[rank].push_back({first + range.range.first, first + range.range.last});

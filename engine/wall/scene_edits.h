@@ -45,14 +45,16 @@ class SceneEdits {
  private:
   [[nodiscard]] Node& find(const std::string& name);
   void transform(const Node& node, const glm::dmat4& change);
-  [[nodiscard]] std::vector<std::vector<SurfaceRange>> renumbered_parts(const Scene& scene,
-                                                                        const std::vector<bool>& hidden) const;
+  [[nodiscard]] std::vector<std::vector<SurfaceRange>> renumbered(
+      const std::vector<std::vector<InstanceRange>>& old_parts, const Scene& scene,
+      const std::vector<bool>& hidden) const;
 
   std::vector<Node> nodes_;
   std::vector<Instance> instances_;  ///< all, where they are now
   std::vector<std::string> names_;   ///< per instance
   std::vector<EditedLight> lights_;
   std::vector<std::vector<InstanceRange>> parts_;  ///< Scene::parts, where it is shared out
+  std::vector<std::vector<InstanceRange>> pages_;  ///< Scene::pages
 };
 
 }  // namespace hpr

@@ -88,6 +88,11 @@ AlphaUse alpha_use_of(const WallJob& job) {
   return is_kept && !is_mixed && !job.link ? AlphaUse::Straight : AlphaUse::OverBlack;
 }
 
+/// A viewer is to see each frame as soon as it is drawn, and what comes once has no frame to come after it.
+bool shows_while_drawing(const WallJob& job) {
+  return job.display->shows_on_any_thread && !job.link && !job.open_ended() && job.frame_count() > 1;
+}
+
 }  // namespace
 
 WallDriver::WallDriver(const WallJob& job, Session& session)
@@ -106,7 +111,8 @@ WallDriver::WallDriver(const WallJob& job, Session& session)
             if (journal_) journal_->add_command(line);
           }),
       hosts_(all_gather_texts(session.comm(), session.host())),
-      owners_(owners_of(wall_, hosts_, job.link.has_value())) {
+      owners_(owners_of(wall_, hosts_, job.link.has_value())),
+      shows_while_drawing_(shows_while_drawing(job)) {
   control_.reject_change("aov", "its files are named before a wall starts");
   if (job_.path) control_.reject_change("camera", "it follows --path");
   if (job_.display->whole_wall) std::ranges::fill(owners_, 0);
@@ -119,6 +125,7 @@ WallDriver::WallDriver(const WallJob& job, Session& session)
       if (owners_[screen] == session_.comm().rank()) options.screens->push_back(screen);
     }
     if (shows_any() && !remote_) display_ = job_.display->make(wall_, options);
+    if (display_ && shows_while_drawing_) background_.emplace(*display_);
   });
   manifest_.scene_hash = content_hash(session.scene());
   manifest_.wall_hash = wall_.hash;
@@ -274,13 +281,16 @@ bool WallDriver::draw(std::uint64_t number, Progress& progress) {
   last_cost_ = {watch.ms(), session_.comm().bytes_sent() - sent_before};
   if (failure) {
     failed_.add_failed(number);
-    if (pictures_.empty() || failed_.in_a_row() >= kMaxFailedInARow) throw AgreedError(*failure);
+    if (!pictures_ || failed_.in_a_row() >= kMaxFailedInARow) throw AgreedError(*failure);
     if (session_.rank() == 0) log::error("frame {} failed: {}", number, failure->what());
   } else {
     failed_.add_drawn();
   }
-  agree_on_failure(session_.comm(), [&] { show(number); });
-  shown_ms_ = watch.ms();
+  agree_on_failure(session_.comm(), [&] {
+    wait_until_shown();
+    show(number);
+  });
+  if (!background_) shown_ms_ = watch.ms();
   record(number, failure);
   return true;
 }
@@ -314,8 +324,8 @@ bool WallDriver::make_pictures(const std::vector<View>& views, std::uint64_t num
     curved_->finish(views, pictures, session_.threads());
     pictures = compose_screens(wall_, std::move(pictures));
     std::vector<Image<Rgba8>> monitor_pictures = monitors_.draw(session_.comm(), pictures, owners_);
-    pictures_ = std::move(pictures);
-    monitor_pictures_ = std::move(monitor_pictures);
+    // The last ones may still be shown.
+    pictures_ = std::make_shared<WallPictures>(WallPictures{std::move(pictures), std::move(monitor_pictures)});
     exposure_ = exposure;
     return true;
   } catch (...) {
@@ -373,24 +383,31 @@ bool WallDriver::settled() {
 bool WallDriver::finish() {
   report_stall_limit({});  // results may take as long as they like to be gathered and written
   agree_on_failure(session_.comm(), [&] {
+    wait_until_shown();
     if (display_) display_->finish();
   });
+  if (shows_while_drawing_ && !manifest_.frames.empty()) {
+    (void)record_screens(false);
+    finish_record(manifest_.frames.back());
+  }
   if (journal_) journal_->add_end();
   return !remote_ || end_displays(session_.comm(), *remote_, job_.link->fail_on, manifest_);
 }
 
 std::vector<Image<Rgba8>> WallDriver::collect_pictures() {
   Communicator& comm = session_.comm();
+  if (background_) background_->wait();  // it reads them
   for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
     const int from = owners_[screen];
     if (from == 0) continue;
-    if (comm.rank() == from) comm.send(std::as_bytes(pictures_[screen].pixels()), 0);
+    std::vector<Image<Rgba8>>& pictures = pictures_->screens;
+    if (comm.rank() == from) comm.send(std::as_bytes(pictures[screen].pixels()), 0);
     if (comm.rank() == 0) {
-      pictures_[screen] = Image<Rgba8>(wall_.screens[screen].pixels);
-      comm.receive(std::as_writable_bytes(pictures_[screen].pixels()), from);
+      pictures[screen] = Image<Rgba8>(wall_.screens[screen].pixels);
+      comm.receive(std::as_writable_bytes(pictures[screen].pixels()), from);
     }
   }
-  return std::move(pictures_);
+  return std::move(pictures_->screens);
 }
 
 std::vector<View> WallDriver::screens_in(std::uint64_t frame, std::span<const HeadPose> heads) const {
@@ -406,52 +423,79 @@ bool WallDriver::shows_any() const {
 
 void WallDriver::show(std::uint64_t number) {
   if (!display_ && !remote_) return;
-  const trace::Span span("show");
-  std::vector<ScreenPicture> mine;
+  std::vector<std::size_t> mine;
   for (std::size_t screen = 0; screen < owners_.size(); ++screen) {
-    if (owners_[screen] == session_.comm().rank()) mine.push_back({screen, pictures_[screen]});
+    if (owners_[screen] == session_.comm().rank()) mine.push_back(screen);
   }
-  if (remote_) {
-    remote_->show({number, mine, {}});
+  if (background_) {
+    background_->show(number, pictures_, std::move(mine));
     return;
   }
-  std::vector<MonitorPicture> monitors;
-  for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor)
-    monitors.push_back({monitor, monitor_pictures_[monitor]});
-  display_->show({number, mine, monitors});
+  const trace::Span span("show");
+  if (!remote_) {
+    show_pictures(*display_, number, *pictures_, mine);
+    costs_ = display_->costs();
+    return;
+  }
+  std::vector<ScreenPicture> screens;
+  for (const std::size_t screen : mine) screens.push_back({screen, pictures_->screens[screen]});
+  remote_->show({number, screens, {}});
+  costs_ = remote_->costs();
 }
 
-/// Collects the records of the screens of all ranks on rank 0.
-std::vector<ScreenRecord> WallDriver::record_screens() {
+/// Waits for the frame that is shown on another thread.
+void WallDriver::wait_until_shown() {
+  if (!background_) return;
+  const trace::Span span("wait for display");
+  background_->wait();
+  shown_ms_ = background_->shown_ms();
+  costs_ = display_->costs();
+}
+
+/// Collects the records of the screens of all ranks on rank 0. What showing them took is that of the last frame that
+/// was shown: where frames are shown while the next is drawn, it goes to the last record. No new frame: to that alone.
+std::vector<ScreenRecord> WallDriver::record_screens(bool of_new_frame) {
   // Per screen its hash, its bytes, and the microseconds it took and one; 0: not known.
   const std::size_t count = owners_.size();
   std::vector<std::uint64_t> reported(3 * count, 0);
   for (std::size_t screen = 0; screen < count; ++screen) {
-    if (owners_[screen] != session_.comm().rank()) continue;
-    reported[screen] = record_screen(wall_.screens[screen].id, pictures_[screen], ScreenState::Fresh).xxh64;
+    if (!of_new_frame || owners_[screen] != session_.comm().rank()) continue;
+    reported[screen] = record_screen(wall_.screens[screen].id, pictures_->screens[screen], ScreenState::Fresh).xxh64;
   }
-  for (const ScreenCost& cost : remote_ ? remote_->costs() : display_ ? display_->costs() : std::vector<ScreenCost>()) {
+  for (const ScreenCost& cost : costs_) {
     reported[count + cost.screen] = cost.bytes;
     reported[2 * count + cost.screen] = static_cast<std::uint64_t>(1000.0 * cost.ms) + 1;
   }
   session_.comm().reduce_max(reported, 0);  // all but the owner's are 0
   std::vector<ScreenRecord> screens;
   for (std::size_t i = 0; i < count; ++i) {
-    ScreenRecord screen{wall_.screens[i].id, wall_.screens[i].pixels, reported[i], ScreenState::Fresh, owners_[i]};
-    if (const std::uint64_t microseconds = reported[2 * count + i]; microseconds > 0) {
-      screen.ms = static_cast<double>(microseconds - 1) / 1000.0;
-      screen.bytes = reported[count + i];
-    }
-    screens.push_back(std::move(screen));
+    screens.push_back({wall_.screens[i].id, wall_.screens[i].pixels, reported[i], ScreenState::Fresh, owners_[i]});
+  }
+  std::vector<ScreenRecord>* shown = &screens;
+  if (shows_while_drawing_) shown = manifest_.frames.empty() ? nullptr : &manifest_.frames.back().screens;
+  for (std::size_t i = 0; shown != nullptr && i < count; ++i) {
+    const std::uint64_t microseconds = reported[2 * count + i];
+    if (microseconds == 0) continue;
+    (*shown)[i].ms = static_cast<double>(microseconds - 1) / 1000.0;
+    (*shown)[i].bytes = reported[count + i];
   }
   return screens;
+}
+
+/// Once the frame was shown: its record is whole.
+void WallDriver::finish_record(FrameRecord& frame) {
+  // Of an open-ended run only now and then: that it gets on is all that counts.
+  constexpr std::uint64_t kFramesPerEntry = 1000;
+  const bool is_news = job_.frames ? frame.frame >= journaled_ : frame.frame % kFramesPerEntry == 0;
+  if (journal_ && is_news) journal_->add_frame(to_json(frame));
 }
 
 void WallDriver::record(std::uint64_t number, const std::optional<Error>& failure) {
   const double slowest = std::ranges::max(all_gather_value(session_.comm(), last_cost_.ms));
   slowest_ms_ = std::max({slowest_ms_, slowest, shown_ms_});
   report_stall_limit(stall_limit_of(job_, slowest_ms_));
-  FrameRecord frame{number, slowest, strategy(), record_screens()};
+  FrameRecord frame{number, slowest, strategy(), record_screens(true)};
+  if (shows_while_drawing_ && !manifest_.frames.empty()) finish_record(manifest_.frames.back());
   if (failure) {
     frame.failed = failure->what();
     for (ScreenRecord& screen : frame.screens) screen.state = ScreenState::Stale;
@@ -466,13 +510,11 @@ void WallDriver::record(std::uint64_t number, const std::optional<Error>& failur
   }
   if (plan().verify_percent > 0.0) frame.verify = to_record({plan().verify_percent, verified_});
   frame.heads = heads_.report();
-  for (std::size_t monitor = 0; monitor < monitor_pictures_.size(); ++monitor) {
-    frame.monitors.push_back(record_screen(wall_.monitors[monitor].id, monitor_pictures_[monitor], ScreenState::Fresh));
+  for (std::size_t monitor = 0; monitor < pictures_->monitors.size(); ++monitor) {
+    frame.monitors.push_back(
+        record_screen(wall_.monitors[monitor].id, pictures_->monitors[monitor], ScreenState::Fresh));
   }
-  // Of an open-ended run only now and then: that it gets on is all that counts.
-  constexpr std::uint64_t kFramesPerEntry = 1000;
-  const bool is_news = job_.frames ? number >= journaled_ : number % kFramesPerEntry == 0;
-  if (journal_ && is_news) journal_->add_frame(to_json(frame));
+  if (!shows_while_drawing_) finish_record(frame);
   // An open-ended run keeps its last frames only.
   constexpr std::size_t kMaxRecords = 10'000;
   if (!job_.frames && manifest_.frames.size() == kMaxRecords) {

@@ -18,6 +18,7 @@
 #include "engine/wall/wall_job.h"
 #include "rt/show/show.h"
 #include "walls/config/wall.h"
+#include "walls/displays/background_display.h"
 #include "walls/displays/display.h"
 #include "walls/geometry/curved.h"
 #include "walls/manifest/manifest.h"
@@ -89,13 +90,15 @@ class WallDriver {
   void resume(std::vector<std::string>& frames);
   [[nodiscard]] std::string status() const;
   void show(std::uint64_t number);
+  void wait_until_shown();
   [[nodiscard]] bool make_pictures(const std::vector<View>& views, std::uint64_t number, Progress& progress);
   [[nodiscard]] bool take_news();
   void apply_keys(const ViewKeys& keys);
   void change_setting(const std::string& name, const std::string& value);
   void record(std::uint64_t number, const std::optional<Error>& failure);
   void warn_of_slow_ranks(std::span<const RankWork> works);
-  [[nodiscard]] std::vector<ScreenRecord> record_screens();
+  [[nodiscard]] std::vector<ScreenRecord> record_screens(bool of_new_frame);
+  void finish_record(FrameRecord& frame);
   [[nodiscard]] std::string strategy() const;
 
   const WallJob& job_;
@@ -116,15 +119,17 @@ class WallDriver {
   std::optional<CurvedScreens> curved_;
   std::optional<FrameMaker> frames_;
   std::unique_ptr<Display> display_;
-  std::unique_ptr<WallSender> remote_;          ///< in place of a display, to those outside the job
-  std::vector<Image<Rgba8>> pictures_;          ///< per screen; empty where another rank shows it
-  std::vector<Image<Rgba8>> monitor_pictures_;  ///< per monitor, on rank 0
+  std::optional<BackgroundDisplay> background_;  ///< of display_, where shows_while_drawing_
+  std::unique_ptr<WallSender> remote_;           ///< in place of a display, to those outside the job
+  std::shared_ptr<WallPictures> pictures_;       ///< null before the first frame
   RunManifest manifest_;
   FrameCost last_cost_;
-  double shown_ms_ = 0.0;      ///< of the last frame, until this rank had shown it
-  std::size_t journaled_ = 0;  ///< frames that the journal had when this job began
-  double slowest_ms_ = 0.0;    ///< of the frames since something was changed
-  VerifyCounts verified_;      ///< in the last frame, all its attempts
+  double shown_ms_ = 0.0;          ///< of the last frame that this rank has shown, until it had
+  bool shows_while_drawing_;       ///< a frame is shown while the next one is drawn; its record follows once it is
+  std::vector<ScreenCost> costs_;  ///< of the last frame that was shown
+  std::size_t journaled_ = 0;      ///< frames that the journal had when this job began
+  double slowest_ms_ = 0.0;        ///< of the frames since something was changed
+  VerifyCounts verified_;          ///< in the last frame, all its attempts
   FailedFrames failed_;
   SlowRankWatch slow_ranks_;           ///< on rank 0
   std::optional<RunJournal> journal_;  ///< on rank 0 of a job that is started again when it is lost

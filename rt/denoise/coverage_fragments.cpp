@@ -16,8 +16,9 @@ namespace {
 constexpr std::uint32_t kSubpixelScreen = 0xFFFFFFFEU;
 /// Pixels squared that are added to how far features lie apart: close ones determine no slope.
 constexpr float kRidge = 0.01F;
-/// Pixels that are traced together.
+/// Pixels that are traced together: more where each trace waits for other ranks.
 constexpr std::size_t kPixelsTogether = 32;
+constexpr std::size_t kSharedPixelsTogether = 256;
 /// Pixels with more fragments get one of Shows::Many.
 constexpr std::size_t kMaxFragments = 4;
 
@@ -116,6 +117,7 @@ std::vector<std::uint8_t> FragmentFinder::find(const LightContext& context, RayB
   pending_.clear();
   found.fragments.clear();
   silhouettes_.find(context, buffers, job);
+  const std::size_t together = context.surfaces.are_shared_out() ? kSharedPixelsTogether : kPixelsTogether;
   found.fragments.reserve(2 * silhouettes_.crossed().size());
   for (const SilhouetteEdges::Pixel& pixel : silhouettes_.crossed()) {
     crossed[pixel.pixel] = 1;
@@ -124,7 +126,7 @@ std::vector<std::uint8_t> FragmentFinder::find(const LightContext& context, RayB
       continue;
     }
     pending_.push_back(pixel.pixel);
-    if (pending_.size() == kPixelsTogether) trace_pending(context, buffers, job, found);
+    if (pending_.size() == together) trace_pending(context, buffers, job, found);
   }
   trace_pending(context, buffers, job, found);
   return crossed;

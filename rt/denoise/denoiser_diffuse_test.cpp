@@ -71,8 +71,9 @@ TEST(Denoiser, NothingIsSharedAcrossTheGlossyCutoff) {
   floor.metallic = 0.5F;
   floor.roughness = 1.0F;
   floor.metallic_roughness_texture.texture = 0;
-  Image<Rgba8>& roughness = scene.textures.emplace_back().image = Image<Rgba8>({64, 1}, {0, 60, 255, 255});
+  Image<Rgba8> roughness({64, 1}, {0, 60, 255, 255});
   for (int x = 32; x < 64; ++x) roughness.at(x, 0).g = 100;
+  scene.textures.emplace_back().image = std::move(roughness);
   finish_scene(scene);
   const View view = view_from({0.5, 5, 1}, {0, 0, 0}, {90, 66}, scene);
   RaySettings settings = kGathered;

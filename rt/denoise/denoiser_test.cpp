@@ -284,8 +284,9 @@ TEST(Denoiser, SubpixelSamplesSeeWhatGlowsInPart) {
   add_material(scene, striped);
   Texture stripes;
   stripes.nearest = true;
-  stripes.image = Image<Rgba8>({64, 1});
-  for (int x = 0; x < 64; ++x) stripes.image.at(x, 0) = x % 2 == 0 ? Rgba8{255, 255, 255, 255} : Rgba8{0, 0, 0, 255};
+  Image<Rgba8> image({64, 1});
+  for (int x = 0; x < 64; ++x) image.at(x, 0) = x % 2 == 0 ? Rgba8{255, 255, 255, 255} : Rgba8{0, 0, 0, 255};
+  stripes.image = std::move(image);
   scene.textures.push_back(stripes);
   for (int i = -6; i <= 6; ++i) {
     place_mesh(scene, add_mesh(scene, quad({0.2F * static_cast<float>(i), -4, 0}, {0.1F, 0, 0}, {0.4F, 8, 0}, 0)));

@@ -119,6 +119,7 @@ void trace_primary_rays(const LightContext& context, RayBuffers& buffers, Cohere
   buffers.hits.resize(buffers.requests.size());
   if (buffers.requests.empty()) return;
   buffers.counts.primary += buffers.requests.size();
+  buffers.scratch.batch.purpose = {RayKind::Primary};
   buffers.counts.invalid += context.rays->closest(buffers.requests, buffers.hits, buffers.scratch, coherence);
 }
 

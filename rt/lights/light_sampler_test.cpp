@@ -130,7 +130,7 @@ TEST(LightSampler, DensitiesFoundBackwardsAreThoseOfTheSamples) {
   scene.lights.push_back(lamp({}, 0.01F));
   scene.lights.back().type = LightType::Directional;
   const LightSampler lights(scene);
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   int triangles = 0;
   int outside = 0;
   for (std::uint32_t i = 0; i < 30'000; ++i) {

@@ -185,7 +185,7 @@ TriangleLights::TriangleLights(const Scene& scene) : scene_(&scene) {
   std::vector<std::uint8_t> emitting;
   for (const Material& material : scene.materials) emitting.push_back(emits(scene, material) ? 1 : 0);
   if (std::ranges::count(emitting, 1) == 0) return;  // Surfaces looks at every vertex
-  auto all = std::make_unique<const Surfaces>(scene, RaySpace(scene.bounds));
+  auto all = std::make_unique<const Surfaces>(scene, RaySpace(scene));
   const Surfaces& surfaces = *all;
   WorldTriangle world;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {

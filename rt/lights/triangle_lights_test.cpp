@@ -104,8 +104,9 @@ TEST(TriangleLights, TexturesAreReadWhereTheSampleFalls) {
   scene.textures.resize(1);
   scene.textures[0].nearest = true;
   scene.textures[0].wrap_s = scene.textures[0].wrap_t = Wrap::ClampToEdge;
-  scene.textures[0].image = Image<Rgba8>({2, 1}, {0, 0, 0, 255});
-  scene.textures[0].image.at(1, 0) = {255, 255, 255, 255};
+  Image<Rgba8> image({2, 1}, {0, 0, 0, 255});
+  image.at(1, 0) = {255, 255, 255, 255};
+  scene.textures[0].image = std::move(image);
   scene.materials[0].emissive_texture.texture = 0;
   const TriangleLights lights(scene);
   ASSERT_EQ(lights.size(), 1U);
@@ -143,8 +144,9 @@ TEST(TriangleLights, ACoatDimsThemTheMoreTheyAreSeenAslant) {
 TEST(TriangleLights, TrianglesATextureLeavesBlackAreNoLights) {
   Scene scene = lamp(1.0, 1.0);
   scene.textures.resize(1);
-  scene.textures[0].image = Image<Rgba8>({64, 64}, {0, 0, 0, 255});
-  scene.textures[0].image.at(63, 63) = {255, 255, 255, 255};
+  Image<Rgba8> image({64, 64}, {0, 0, 0, 255});
+  image.at(63, 63) = {255, 255, 255, 255};
+  scene.textures[0].image = std::move(image);
   scene.textures[0].wrap_s = scene.textures[0].wrap_t = Wrap::ClampToEdge;
   scene.materials[0].emissive_texture.texture = 0;
   scene.meshes[0].uvs[0] = {{0.1F, 0.1F}, {0.2F, 0.1F}, {0.1F, 0.2F}};

@@ -50,6 +50,7 @@ glm::dvec4 decoded(Rgba8 texel, Encoding encoding) {
 glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 uv) {
   const Size size = texture.image.size();
   if (size.area() == 0) return glm::dvec4(1.0);
+  texture.image.require();
   const double s = wrapped(uv.x, texture.wrap_s) * size.width;
   const double t = wrapped(uv.y, texture.wrap_t) * size.height;
   if (texture.nearest) {
@@ -77,7 +78,7 @@ glm::dvec4 sample_texture(const Texture& texture, Encoding encoding, glm::dvec2 
 
 void prefetch_texture(const Texture& texture, glm::dvec2 uv) {
   const Size size = texture.image.size();
-  if (size.area() == 0) return;
+  if (size.area() == 0 || !texture.image.is_here()) return;
   const int x = std::min(static_cast<int>(wrapped(uv.x, texture.wrap_s) * size.width), size.width - 1);
   const double t = wrapped(uv.y, texture.wrap_t) * size.height;
   // Its neighbours in the row mostly lie in the same line of the cache.

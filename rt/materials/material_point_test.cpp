@@ -158,7 +158,7 @@ Scene mapped_quad(std::uint8_t x, std::uint8_t y, const glm::dmat4& to_world = g
 }
 
 glm::dvec3 normal_seen(const Scene& scene, const glm::dvec3& eye, const glm::dvec3& at) {
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   WorldTriangle triangle;
   surfaces.load(0, triangle);
   return evaluate_material(scene, surfaces.meet(triangle, eye, at - eye)).normal;

@@ -11,8 +11,9 @@ namespace {
 /// Four texels in a row whose red says where they are: 0, 51, 102, 153.
 Texture row_of_four(Wrap wrap, bool nearest) {
   Texture texture;
-  texture.image = Image<Rgba8>({4, 1});
-  for (int x = 0; x < 4; ++x) texture.image.at(x, 0) = {static_cast<std::uint8_t>(51 * x), 0, 0, 255};
+  Image<Rgba8> image({4, 1});
+  for (int x = 0; x < 4; ++x) image.at(x, 0) = {static_cast<std::uint8_t>(51 * x), 0, 0, 255};
+  texture.image = std::move(image);
   texture.wrap_s = wrap;
   texture.nearest = nearest;
   return texture;
@@ -56,13 +57,14 @@ TEST(Texture, AnyCoordinateIsSafe) {
 
 TEST(Texture, DecodesColourBeforeMixingAndNeverAlpha) {
   Texture texture;
-  texture.image = Image<Rgba8>({2, 1});
-  texture.image.at(0, 0) = {0, 0, 0, 0};
-  texture.image.at(1, 0) = {255, 255, 255, 255};
+  Image<Rgba8> image({2, 1});
+  image.at(1, 0) = {255, 255, 255, 255};
+  texture.image = image;
   const glm::dvec4 center = sample_texture(texture, Encoding::Srgb, {0.5, 0.5});
   EXPECT_NEAR(center.r, 0.5, 1e-7);
   EXPECT_NEAR(center.a, 0.5, 1e-12);
-  texture.image.at(0, 0) = {128, 0, 0, 128};
+  image.at(0, 0) = {128, 0, 0, 128};
+  texture.image = image;
   const glm::dvec4 left = sample_texture(texture, Encoding::Srgb, {0.25, 0.5});
   EXPECT_NEAR(left.r, 0.2158605, 1e-6);
   EXPECT_NEAR(left.a, 128.0 / 255.0, 1e-12);

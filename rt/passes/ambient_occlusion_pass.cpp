@@ -40,6 +40,7 @@ class AmbientOcclusionPass final : public Pass {
     }
     std::vector<float> passed(buffers.requests.size());
     buffers.counts[PassId::AmbientOcclusion] += buffers.requests.size();
+    buffers.scratch.batch.purpose = {RayKind::Occlusion, wave.generation()};
     buffers.counts.invalid += context.rays->passed(buffers.requests, passed, buffers.scratch);
     for (std::size_t i = 0; i < passed.size(); ++i) {
       const PathVertex& point = wave.vertices[buffers.requests[i].owner];

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <span>
 
 #include "rt/passes/path_vertex.h"
 #include "rt/photons/photon_query.h"
@@ -6,6 +8,11 @@
 /// The passes that follow lobes of surfaces by rays.
 namespace hpr {
 namespace {
+
+std::array<Lobe, 2> lobe_and_extension(PassId pass) {
+  const Lobe lobe = *info_of(pass).lobe;
+  return {lobe, extension_of(lobe)};
+}
 
 /// Mirror images, sharp and blurred: one ray per point along its specular reflection.
 class ReflectionPass final : public Pass {
@@ -19,13 +26,10 @@ class ReflectionPass final : public Pass {
                                : "no material is smoother than the glossy cutoff"};
   }
 
-  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
-               std::vector<PathVertex>& next) const override {
-    const PassInfo& pass = info_of(PassId::Reflection);
-    for (const Lobe lobe : {*pass.lobe, extension_of(*pass.lobe)}) {
-      follow_lobe(context, wave, pass, lobe, buffers, sums, next);
-    }
-  }
+  [[nodiscard]] std::span<const Lobe> lobes() const override { return lobes_; }
+
+ private:
+  std::array<Lobe, 2> lobes_ = lobe_and_extension(PassId::Reflection);
 };
 
 /// What is seen through surfaces, bent by solids and straight through sheets, clear and frosted: one ray per point.
@@ -35,13 +39,10 @@ class RefractionPass final : public Pass {
     return scene.refraction;
   }
 
-  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
-               std::vector<PathVertex>& next) const override {
-    const PassInfo& pass = info_of(PassId::Refraction);
-    for (const Lobe lobe : {*pass.lobe, extension_of(*pass.lobe)}) {
-      follow_lobe(context, wave, pass, lobe, buffers, sums, next);
-    }
-  }
+  [[nodiscard]] std::span<const Lobe> lobes() const override { return lobes_; }
+
+ private:
+  std::array<Lobe, 2> lobes_ = lobe_and_extension(PassId::Refraction);
 };
 
 /// Indirect light along rays: lobes that no other pass follows are followed too, so that paths go on until they leave
@@ -58,10 +59,7 @@ class GatherPass final : public Pass {
     return gathers_by_rays(scene, settings) || final_gathers(scene, settings);
   }
 
-  void scatter(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums,
-               std::vector<PathVertex>& next) const override {
-    for (const Lobe lobe : kLobes) follow_lobe(context, wave, info_of(PassId::Gather), lobe, buffers, sums, next);
-  }
+  [[nodiscard]] std::span<const Lobe> lobes() const override { return kLobes; }
 };
 
 /// Whether all indirect light is wanted, and nobody says which pass is to bring it.

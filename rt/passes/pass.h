@@ -72,6 +72,11 @@ struct DirectSample {
 struct Wavefront {
   std::vector<PathVertex> vertices;
   std::vector<DirectSample> samples;  ///< light by light, inside a light in the order of vertices
+
+  /// Of the rays that leave its vertices, which are all as many bounces from the eye.
+  [[nodiscard]] std::uint16_t generation() const {
+    return vertices.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(vertices.front().depth + 1);
+  }
 };
 
 /// A ray along a lobe of a vertex.
@@ -116,7 +121,9 @@ struct LightContext {
 struct RayBuffers {
   std::vector<RayRequest> requests;
   std::vector<std::uint32_t> hits;  ///< per request: a surface, or kNoSurface
-  std::vector<LobeRay> lobe_rays;   ///< per request of follow_lobe
+  std::vector<LobeRay> lobe_rays;   ///< of all passes that follow lobes, pass after pass
+  std::vector<RayRequest> lobe_requests;
+  std::vector<std::uint32_t> lobe_hits;
   RayCounts counts;
   TraversalScratch scratch;
   FoundPhotons found_photons;
@@ -137,8 +144,10 @@ class Pass {
     return true;
   }
 
-  /// Once per wavefront: reads its vertices; may add to the pixels' sums and append the vertices its rays reach to
-  /// `next`.
+  /// The lobes that it follows by rays, which are traced together with those of other passes (LobeRays).
+  [[nodiscard]] virtual std::span<const Lobe> lobes() const { return {}; }
+
+  /// Once per wavefront: reads its vertices; may add to the pixels' sums and append vertices to `next`.
   virtual void scatter(const LightContext& /*context*/, const Wavefront& /*wave*/, RayBuffers& /*buffers*/,
                        PixelSums& /*sums*/, std::vector<PathVertex>& /*next*/) const {}
 

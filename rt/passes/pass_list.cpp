@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <ranges>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "rt/passes/pass.h"
 #include "rt/photons/photon_query.h"
+#include "rt/show/show.h"
 
 namespace hpr {
 namespace {
@@ -122,7 +122,8 @@ const PassInfo* alternative_to(const PassInfo& pass) {
 
 /// Throws Error (Usage) for passes of `settings` that do not go together.
 void check_combination(const RaySettings& settings) {
-  for (const PassInfo& pass : std::views::reverse(kAllPasses)) {
+  for (std::size_t i = kAllPasses.size(); i-- > 0;) {
+    const PassInfo& pass = kAllPasses.at(i);
     if (!names_pass(settings, pass.id)) continue;
     const PassInfo* const other = alternative_to(pass);
     if (other != nullptr && names_pass(settings, other->id)) {
@@ -241,6 +242,10 @@ bool runs_pass(std::span<const PassPlan> plan, PassId pass) {
 bool runs_pass(std::span<const PassPlan> plan, bool (*matches)(const PassInfo& pass)) {
   return std::ranges::any_of(plan,
                              [&](const PassPlan& planned) { return planned.runs && matches(info_of(planned.pass)); });
+}
+
+bool traces_rays_beside_keys(const Requirements& scene, const RaySettings& settings) {
+  return traces_own_rays(settings.show) || std::ranges::any_of(plan_passes(scene, settings), &PassPlan::runs);
 }
 
 bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings) {

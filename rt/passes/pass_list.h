@@ -96,6 +96,10 @@ struct PassInfo {
 /// Whether a pass runs whose row `matches`.
 [[nodiscard]] bool runs_pass(std::span<const PassPlan> plan, bool (*matches)(const PassInfo& pass));
 
+/// Whether a pass, or what is shown in place of light, traces rays, so that a scene for them is needed whoever makes
+/// the keys.
+[[nodiscard]] bool traces_rays_beside_keys(const Requirements& scene, const RaySettings& settings);
+
 /// Whether a pass that runs sends rays from lifted origins.
 [[nodiscard]] bool lifts_origins(std::span<const PassPlan> plan, const RaySettings& settings);
 

@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "core/parallel.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/pass.h"
 #include "rt/photons/photon_query.h"
@@ -31,7 +32,9 @@ class PrimaryVertices {
 
   void find() {
     const std::size_t before = points_.size();
-    if (context_.surfaces.are_shared_out()) fetch_all();
+    TileJob job = job_;
+    job.rows = rows_;
+    fetch_triangles(context_, std::span(&job, 1));
     find_surfaces();
     for (PathVertex& point : std::span(points_).subspan(before)) finish_vertex(context_, point);
   }
@@ -65,19 +68,8 @@ class PrimaryVertices {
     start_vertex(context_, job_, x, y, fraction, point);
   }
 
-  /// At once, as each request is a round of messages.
-  void fetch_all() const {
-    std::vector<std::uint32_t> ids;
-    for (int y = rows_.first; y < rows_.end; ++y) {
-      for (int x = 0; x < job_.rect.width(); ++x) {
-        const Key key = job_.keys[static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x)];
-        if (key != kNoKey) ids.push_back(key_surface(key));
-      }
-    }
-    context_.surfaces.prefetch(ids);
-  }
-
   void prefetch(int y) const {
+    if (context_.surfaces.are_shared_out()) return;  // fetch_triangles() did, for all rows
     std::array<std::uint32_t, kTileSide> ids;
     const std::span<const Key> row = job_.keys.subspan(static_cast<std::size_t>(y) * kTileSide, kTileSide);
     std::ranges::transform(row, ids.begin(), [](Key key) { return key == kNoKey ? kNoSurface : key_surface(key); });
@@ -110,6 +102,7 @@ class PrimaryVertices {
       }
     }
     buffers_.counts.primary += buffers_.requests.size();
+    buffers_.scratch.batch.purpose = {RayKind::Primary};
     std::vector<RayRequest> rays = std::move(buffers_.requests);
     context_.rays->visit_alpha_tested(
         rays, buffers_.scratch,
@@ -167,14 +160,15 @@ std::vector<std::size_t> fullest_first(std::span<const std::size_t> tiles, const
   constexpr std::size_t kManyPerThread = 64;
   std::vector<std::size_t> order(tiles.begin(), tiles.end());
   if (threads < 2 || order.size() > kManyPerThread * static_cast<std::size_t>(threads)) return order;
-  std::vector<std::pair<std::ptrdiff_t, std::size_t>> empty;  // pixels, of every fourth row
-  for (const std::size_t tile : order) {
+  std::vector<std::pair<std::ptrdiff_t, std::size_t>> empty(order.size());  // pixels, of every fourth row
+  parallel_for(threads, order.size(), [&](std::size_t i) {
+    const std::size_t tile = order[i];
     std::ptrdiff_t pixels = keys.active(tile) ? 0 : kTilePixels;
     for (std::size_t row = 0; keys.active(tile) && row < kTilePixels; row += 4 * std::size_t{kTileSide}) {
       pixels += std::ranges::count(keys.tile(tile).subspan(row, kTileSide), kNoKey);
     }
-    empty.emplace_back(pixels, tile);
-  }
+    empty[i] = {pixels, tile};
+  });
   std::ranges::sort(empty);
   std::ranges::transform(empty, order.begin(), [](const auto& each) { return each.second; });
   return order;
@@ -192,6 +186,27 @@ int end_of_wavefront(const TileJob& job, int first) {
     points += static_cast<std::size_t>(std::ranges::count(pixels, std::uint8_t{1}));
   } while (++row < job.end_row() && points + kTileSide <= kWavefrontVertices);
   return row;
+}
+
+std::span<PathVertex> last_wavefront(std::span<PathVertex> points) {
+  if (points.size() <= kWavefrontVertices) return points;
+  std::size_t first = points.size() - kWavefrontVertices;
+  while (first < points.size() && points[first - 1].pixel == points[first].pixel) ++first;
+  return first < points.size() ? points.subspan(first) : points;
+}
+
+void fetch_triangles(const LightContext& context, std::span<const TileJob> jobs) {
+  if (!context.surfaces.are_shared_out()) return;
+  std::vector<std::uint32_t> ids;
+  for (const TileJob& job : jobs) {
+    for (int y = job.rows.first; y < job.end_row(); ++y) {
+      for (int x = 0; x < job.rect.width(); ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y) * kTileSide + static_cast<std::size_t>(x);
+        if (job.keys[pixel] != kNoKey) ids.push_back(key_surface(job.keys[pixel]));
+      }
+    }
+  }
+  context.surfaces.prefetch(ids);
 }
 
 void find_primary_vertices(const LightContext& context, const TileJob& job, const RowRange& rows, RayBuffers& buffers,
@@ -301,59 +316,6 @@ bool splits_channels(const PathVertex& point) {
          point.material.roughness < Bsdf::kDeltaRoughness && carries_channels(point.throughput);
 }
 
-/// The rays that follow a lobe of a wavefront: buffers.lobe_rays and buffers.requests.
-class LobeRays {
- public:
-  LobeRays(const LightContext& context, const PassInfo& pass, Lobe lobe, RayBuffers& buffers, PixelSums& sums)
-      : context_(context), pass_(pass), lobe_(lobe), buffers_(buffers), sums_(sums) {}
-
-  /// One per point, or one per channel.
-  void make(const Wavefront& wave) {
-    buffers_.lobe_rays.clear();
-    buffers_.requests.clear();
-    for (const PathVertex& point : wave.vertices) {
-      if (point.lobe_weights[static_cast<std::size_t>(lobe_)] == 0.0F) continue;
-      if (context_.gathers && context_.follows_for_itself(point.bsdf, lobe_) == pass_.gathers_all_lobes) continue;
-      if (lobe_ != Lobe::Transmission || !splits_channels(point)) {
-        add(point, point.bsdf);
-        continue;
-      }
-      for (int channel = 0; channel < 3; ++channel) {
-        if (!(point.throughput[channel] > 0.0)) continue;
-        MaterialPoint material = point.material;
-        set_channel(material, channel, 1.0);
-        // All with the same numbers: what is noisy further on is so in grey.
-        add(point, Bsdf(material, point.surface));
-      }
-    }
-    for (std::size_t i = 0; i < buffers_.lobe_rays.size(); ++i) {
-      buffers_.requests[i].sampler = &buffers_.lobe_rays[i].sampler;
-    }
-  }
-
- private:
-  void add(const PathVertex& point, const Bsdf& bsdf) {
-    Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe_));
-    const auto sample = bsdf.sample(lobe_, next_two(sampler, point.depth));
-    if (!sample) return;
-    const double factor = point.lobe_weights[static_cast<std::size_t>(lobe_)];
-    glm::dvec3 throughput = factor * point.throughput * sample->weight;
-    throughput *= russian_roulette_weight(brightness(throughput), sampler);
-    if (throughput == glm::dvec3(0.0)) return;
-    buffers_.lobe_rays.push_back({&point, throughput, sample->pdf, sampler});
-    buffers_.requests.push_back({ray_origin(point.surface, sample->direction), sample->direction,
-                                 pass_.gathers_all_lobes ? point.gather_reach : std::numeric_limits<double>::infinity(),
-                                 nullptr, 0, faces_met(point, pass_, sample->direction)});
-    sums_.count_ray(point.pixel);
-  }
-
-  const LightContext& context_;
-  const PassInfo& pass_;
-  Lobe lobe_;
-  RayBuffers& buffers_;
-  PixelSums& sums_;
-};
-
 /// What ray i finds of the sky; of rays that gather from the first surface also what it would have found, as direct
 /// light less its shadow.
 void add_sky(const LightContext& context, const RayBuffers& buffers, std::size_t i, const PassInfo& pass,
@@ -361,10 +323,10 @@ void add_sky(const LightContext& context, const RayBuffers& buffers, std::size_t
   const LobeRay& ray = buffers.lobe_rays[i];
   const PathVertex& from = *ray.from;
   if (pass.gathers_all_lobes && from.gathers_near()) return;
-  const bool leaves = buffers.hits[i] == kNoSurface;
+  const bool leaves = buffers.lobe_hits[i] == kNoSurface;
   const bool shows_sky = pass.gathers_all_lobes && from.depth == 0;
   if (!leaves && !(shows_sky && sums.wants_components)) return;
-  const glm::dvec3 sky = sky_along(context, ray, buffers.requests[i].direction, pass);
+  const glm::dvec3 sky = sky_along(context, ray, buffers.lobe_requests[i].direction, pass);
   if (!shows_sky) return sums.add(from.pixel, component_after(from, pass.component), sky);
   if (leaves) return sums.add(from.pixel, Component::Direct, sky, true);
   sums.add_shadowed(from.pixel, sky);
@@ -374,9 +336,9 @@ void add_sky(const LightContext& context, const RayBuffers& buffers, std::size_t
 void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i, const PassInfo& pass,
                  PathVertex& reached) {
   const LobeRay& ray = buffers.lobe_rays[i];
-  const RayRequest& request = buffers.requests[i];
+  const RayRequest& request = buffers.lobe_requests[i];
   const PathVertex& from = *ray.from;
-  const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.hits[i]);
+  const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.lobe_hits[i]);
   reached.surface = context.surfaces.meet(triangle, request.origin, request.direction);
   reached.throughput = ray.throughput;
   reached.media = media_towards(from.media, from.surface, from.material, request.direction);
@@ -458,23 +420,78 @@ void finish_vertex(const LightContext& context, PathVertex& point, double metres
   point.lobe_weights[transmission] *= reflects ? 0.0F : static_cast<float>(1.0 / (1.0 - fraction));
 }
 
-void follow_lobe(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
-                 RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& next) {
-  LobeRays(context, pass, lobe, buffers, sums).make(wave);
-  buffers.hits.resize(buffers.lobe_rays.size());
-  buffers.counts[pass.id] += buffers.lobe_rays.size();
-  buffers.counts.invalid += context.rays->closest(buffers.requests, buffers.hits, buffers.scratch);
+LobeRays::LobeRays(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums)
+    : context_(context), wave_(wave), buffers_(buffers), sums_(sums) {
+  buffers.lobe_rays.clear();
+  buffers.lobe_requests.clear();
+}
 
-  const std::size_t before = next.size();
-  for (std::size_t i = 0; i < buffers.lobe_rays.size(); ++i) {
-    add_sky(context, buffers, i, pass, sums);
-    if (buffers.hits[i] == kNoSurface) continue;
-    make_vertex(context, buffers, i, pass, next.emplace_back());
-    prefetch_material(context.scene, next.back().surface);
+void LobeRays::add(const PassInfo& pass, std::span<const Lobe> lobes) {
+  const std::size_t before = buffers_.lobe_rays.size();
+  for (const Lobe lobe : lobes) {
+    for (const PathVertex& point : wave_.vertices) {
+      if (point.lobe_weights[static_cast<std::size_t>(lobe)] == 0.0F) continue;
+      if (context_.gathers && context_.follows_for_itself(point.bsdf, lobe) == pass.gathers_all_lobes) continue;
+      add_rays(pass, lobe, point);
+    }
   }
+  ends_.push_back(buffers_.lobe_rays.size());
+  buffers_.counts[pass.id] += buffers_.lobe_rays.size() - before;
+}
+
+void LobeRays::add_rays(const PassInfo& pass, Lobe lobe, const PathVertex& point) {
+  if (lobe != Lobe::Transmission || !splits_channels(point)) return add_ray(pass, lobe, point, point.bsdf);
+  for (int channel = 0; channel < 3; ++channel) {
+    if (!(point.throughput[channel] > 0.0)) continue;
+    MaterialPoint material = point.material;
+    set_channel(material, channel, 1.0);
+    // All with the same numbers: what is noisy further on is so in grey.
+    add_ray(pass, lobe, point, Bsdf(material, point.surface));
+  }
+}
+
+double LobeRays::fraction(std::size_t i) const {
+  return static_cast<double>(ends_[i] - first_of(i)) / static_cast<double>(std::max<std::size_t>(ends_.back(), 1));
+}
+
+void LobeRays::add_ray(const PassInfo& pass, Lobe lobe, const PathVertex& point, const Bsdf& bsdf) {
+  Sampler sampler = point.sampler.branch(static_cast<std::uint32_t>(lobe));
+  const auto sample = bsdf.sample(lobe, next_two(sampler, point.depth));
+  if (!sample) return;
+  const double factor = point.lobe_weights[static_cast<std::size_t>(lobe)];
+  glm::dvec3 throughput = factor * point.throughput * sample->weight;
+  throughput *= russian_roulette_weight(brightness(throughput), sampler);
+  if (throughput == glm::dvec3(0.0)) return;
+  buffers_.lobe_rays.push_back({&point, throughput, sample->pdf, sampler});
+  buffers_.lobe_requests.push_back(
+      {ray_origin(point.surface, sample->direction), sample->direction,
+       pass.gathers_all_lobes ? point.gather_reach : std::numeric_limits<double>::infinity(), nullptr, 0,
+       faces_met(point, pass, sample->direction)});
+  sums_.count_ray(point.pixel);
+}
+
+void LobeRays::trace() {
+  buffers_.lobe_hits.resize(buffers_.lobe_rays.size());
+  if (buffers_.lobe_rays.empty()) return;
+  for (std::size_t i = 0; i < buffers_.lobe_rays.size(); ++i) {
+    buffers_.lobe_requests[i].sampler = &buffers_.lobe_rays[i].sampler;
+  }
+  buffers_.scratch.batch.purpose = {RayKind::Bounce, wave_.generation()};
+  buffers_.counts.invalid += context_.rays->closest(buffers_.lobe_requests, buffers_.lobe_hits, buffers_.scratch);
+}
+
+void LobeRays::finish(const PassInfo& pass, std::vector<PathVertex>& next) {
+  const std::size_t before = next.size();
+  for (std::size_t i = first_of(finished_); i < ends_[finished_]; ++i) {
+    add_sky(context_, buffers_, i, pass, sums_);
+    if (buffers_.lobe_hits[i] == kNoSurface) continue;
+    make_vertex(context_, buffers_, i, pass, next.emplace_back());
+    prefetch_material(context_.scene, next.back().surface);
+  }
+  ++finished_;
   // By now the memory has what materials read.
   for (PathVertex& reached : std::span(next).subspan(before)) {
-    finish_vertex(context, reached, glm::distance(reached.surface.position, reached.previous_position));
+    finish_vertex(context_, reached, glm::distance(reached.surface.position, reached.previous_position));
   }
 }
 

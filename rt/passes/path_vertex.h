@@ -51,8 +51,15 @@ inline constexpr std::size_t kWavefrontVertices = 512;
 /// all pixels are shaded.
 [[nodiscard]] int end_of_wavefront(const TileJob& job, int first);
 
+/// The last of some points, a wavefront of whole pixels, whose points are beside each other.
+[[nodiscard]] std::span<PathVertex> last_wavefront(std::span<PathVertex> points);
+
 /// Initializes a vertex whose surface is set, shown at pixel (x, y) of the tile, of which it covers `coverage`.
 void start_vertex(const LightContext& context, const TileJob& job, int x, int y, double coverage, PathVertex& point);
+
+/// Gets the triangles that all pixels of some tiles show, where other ranks hold them: at once, as each request is a
+/// round of messages.
+void fetch_triangles(const LightContext& context, std::span<const TileJob> jobs);
 
 /// Finds the primary vertices in some rows of a tile: the surfaces its keys name, and those of partial coverage before
 /// them, each with the share of the pixel it covers. Adds the background where neither is.
@@ -85,10 +92,34 @@ inline constexpr double kMinThroughput = 1.0 / 65536.0;
 /// the last `metres` of the way there absorbed (0: all is taken off already) and decides which lobes are followed.
 void finish_vertex(const LightContext& context, PathVertex& point, double metres = 0.0);
 
-/// Traces a ray per vertex of the wavefront that follows `lobe`, and appends the vertices those rays reach to `next`.
-/// A pass that gathers all lobes traces rays where no other pass follows the lobe for itself: the sky that such rays
-/// find from the first surface counts as direct light, and what hides it as shadow.
-void follow_lobe(const LightContext& context, const Wavefront& wave, const PassInfo& pass, Lobe lobe,
-                 RayBuffers& buffers, PixelSums& sums, std::vector<PathVertex>& next);
+/// The rays that follow lobes of a wavefront, of all passes that do. They are traced together: one wait where they
+/// travel to other ranks. A pass that gathers all lobes traces rays where no other pass follows the lobe for itself:
+/// the sky that such rays find from the first surface counts as direct light, and what hides it as shadow.
+class LobeRays {
+ public:
+  /// `buffers` has the rays; their earlier ones are gone. All must outlive this.
+  LobeRays(const LightContext& context, const Wavefront& wave, RayBuffers& buffers, PixelSums& sums);
+
+  /// Makes the rays of a pass: one per vertex and lobe, or one per channel.
+  void add(const PassInfo& pass, std::span<const Lobe> lobes);
+  /// Traces all rays.
+  void trace();
+  /// Which fraction of all rays those of pass `i` are, in the order of add().
+  [[nodiscard]] double fraction(std::size_t i) const;
+  /// Adds what the rays of the next pass found, in that order, and appends the vertices that they reached to `next`.
+  void finish(const PassInfo& pass, std::vector<PathVertex>& next);
+
+ private:
+  [[nodiscard]] std::size_t first_of(std::size_t i) const { return i == 0 ? 0 : ends_[i - 1]; }
+  void add_rays(const PassInfo& pass, Lobe lobe, const PathVertex& point);
+  void add_ray(const PassInfo& pass, Lobe lobe, const PathVertex& point, const Bsdf& bsdf);
+
+  const LightContext& context_;
+  const Wavefront& wave_;
+  RayBuffers& buffers_;
+  PixelSums& sums_;
+  std::vector<std::size_t> ends_ = {};  ///< of each pass's rays
+  std::size_t finished_ = 0;            ///< passes
+};
 
 }  // namespace hpr

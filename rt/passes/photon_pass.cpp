@@ -1,3 +1,5 @@
+#include <glm/geometric.hpp>
+
 #include "rt/passes/path_vertex.h"
 #include "rt/photons/photon_query.h"
 #include "rt/photons/photon_tracer.h"
@@ -30,12 +32,19 @@ class PhotonPass final : public Pass {
     if (context.photons == nullptr) return;
     for (const PathVertex& point : wave.vertices) {
       if (point.is_upsampled(Component::Photon)) continue;
-      const auto gather = [&](const PhotonMap& map) {
-        return gather_photons(map, point.surface, point.bsdf, point.material.normal, context.settings.glossy_cutoff,
-                              buffers.found_photons);
+      const PhotonMaps& maps = *context.photons;
+      const auto gather = [&](const PhotonMap& map, double radius) {
+        return gather_photons(map, radius, point.surface, point.bsdf, point.material.normal,
+                              context.settings.glossy_cutoff, buffers.found_photons);
       };
-      glm::dvec3 light = gather(context.photons->caustic);
-      if (!context.gathers || point.gathers_near()) light += gather(context.photons->global);
+      glm::dvec3 light = gather(maps.caustic, maps.caustic.radius());
+      if (!context.gathers || point.gathers_near()) light += gather(maps.global, maps.global.radius());
+      if (point.gathers_near()) {
+        const double distance = glm::distance(point.surface.position, point.previous_position);
+        for (const PhotonMap& map : maps.sparse) {
+          light += gather(map, maps.sparse_radius(map, distance, point.previous_pdf));
+        }
+      }
       if (light != glm::dvec3(0.0)) {
         sums.add(point.pixel, component_after(point, Component::Photon), point.throughput * light);
       }

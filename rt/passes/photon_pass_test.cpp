@@ -94,7 +94,7 @@ TEST(PhotonPass, RanksOfAHostShareItsMemory) {
 
 TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
   const Scene scene = furnace(0.5F, 1.0F);
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const Surfaces surfaces(scene, space);
   const RayScene rays(scene, space, 1);
   const LightSampler lights(scene);
@@ -117,7 +117,7 @@ TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
 
 TEST(PhotonPass, RadiiAndNumbersFollowWhatAPixelCovers) {
   const Scene scene = furnace(0.5F, 1.0F);  // every photon is kept twice in the mean, on 24 square metres
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const Surfaces surfaces(scene, space);
   const RayScene rays(scene, space, 1);
   const LightSampler lights(scene);
@@ -144,9 +144,43 @@ TEST(PhotonPass, RadiiAndNumbersFollowWhatAPixelCovers) {
   EXPECT_NEAR(map_of(1e-6, true).first, std::sqrt(4.0 / 50.0) * wide, 1e-9) << "at the least four photons";
 }
 
+TEST(PhotonPass, GatheredPhotonsAreSparseByTheFirstSamplesRadiusAndLookedUpByTheirOwn) {
+  const Scene scene = furnace(0.5F, 1.0F);
+  const RaySpace space(scene);
+  const Surfaces surfaces(scene, space);
+  const RayScene rays(scene, space, 1);
+  const LightSampler lights(scene);
+  const auto check = [&](std::uint32_t photons, PhotonUse use, auto&& of_maps) {
+    const RaySettings settings{.photons = photons, .global_photons = true, .photon_footprint = 0.01};
+    PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings, use);
+    double first = 0.0;
+    for (const std::uint32_t sample : {0U, 60U}) {
+      const PhotonMaps& maps = builder.build({.sample = sample}, nullptr);
+      if (sample == 0) first = maps.near;
+      of_maps(maps, maps.near / first);
+    }
+  };
+  check(20'000, PhotonUse::Gathered, [](const PhotonMaps& maps, double shrunk) {
+    EXPECT_LT(maps.sparse[0].size() + maps.sparse[1].size(), 200U) << "none lie but by corners where few do";
+    EXPECT_GT(maps.global.size(), 30'000U);
+    EXPECT_NEAR(maps.footprint, 0.25 * shrunk, 1e-9);
+  });
+  // Seven on each wall: few in all cells.
+  check(20, PhotonUse::Gathered, [](const PhotonMaps& maps, double shrunk) {
+    EXPECT_EQ(maps.global.size() + maps.sparse[0].size(), 0U);
+    EXPECT_GT(maps.sparse[1].size(), 20U);
+    EXPECT_NEAR(maps.sparse[1].radius(), 32.0 * maps.near, 1e-9);
+    EXPECT_NEAR(maps.footprint, 0.25 * shrunk, 1e-9);
+  });
+  check(20, PhotonUse::Direct, [](const PhotonMaps& maps, double /*shrunk*/) {
+    EXPECT_GT(maps.global.size(), 20U);
+    EXPECT_EQ(maps.sparse[0].size() + maps.sparse[1].size(), 0U) << "where the eye sees blur";
+  });
+}
+
 TEST(PhotonPass, PhotonsOvertakenOnAnyRankAreDroppedOnAllAndTracedAgainWithTheSameBits) {
   const Scene scene = furnace(0.5F, 1.0F);
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const Surfaces surfaces(scene, space);
   const RayScene rays(scene, space, 1);
   const LightSampler lights(scene);

@@ -31,6 +31,7 @@ class ShadowPass final : public Pass {
     }
     std::vector<float> passed(buffers.requests.size());
     buffers.counts[PassId::Shadow] += buffers.requests.size();
+    buffers.scratch.batch.purpose = {RayKind::Shadow, wave.generation()};
     buffers.counts.invalid += context.rays->passed(buffers.requests, passed, buffers.scratch);
     for (std::size_t i = 0; i < passed.size(); ++i) wave.samples[buffers.requests[i].owner].visible = passed[i];
   }

@@ -65,6 +65,7 @@ void TileMargin::find(const LightContext& context, const TileJob& job, int reach
   }
   buffers.hits.resize(buffers.requests.size());
   buffers.counts.primary += buffers.requests.size();
+  buffers.scratch.batch.purpose = {RayKind::Primary};
   buffers.counts.invalid +=
       context.rays->closest_opaque(buffers.requests, buffers.hits, buffers.scratch, Coherence::High);
   auto hit = buffers.hits.begin();

@@ -41,14 +41,13 @@ struct Place {
     if (leaning.mapped) {
       const auto byte = [](double value) { return static_cast<std::uint8_t>(std::lround(127.5 + 127.5 * value)); };
       Texture map;
-      map.image = Image<Rgba8>({1, 1});
-      map.image.at(0, 0) = {byte(std::sin(angle)), 128, byte(std::cos(angle)), 255};
+      map.image = Image<Rgba8>({1, 1}, {byte(std::sin(angle)), 128, byte(std::cos(angle)), 255});
       scene.textures.push_back(std::move(map));
       scene.materials[used].normal_texture.texture = 0;
     }
     test::place_mesh(scene, test::add_mesh(scene, std::move(mesh)));
     finish_scene(scene);
-    surfaces.emplace(scene, RaySpace(scene.bounds));
+    surfaces.emplace(scene, RaySpace(scene));
     surfaces->load(0, triangle);
   }
 
@@ -139,7 +138,7 @@ std::vector<glm::dvec3> sent_through_glass(double scale) {
   }
   test::place_mesh(scene, test::add_mesh(scene, std::move(mesh)), glm::scale(glm::dmat4(1.0), glm::dvec3(scale)));
   finish_scene(scene);
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   WorldTriangle triangle;
   surfaces.load(0, triangle);
   std::vector<glm::dvec3> sent;

@@ -84,8 +84,9 @@ TEST(PhotonEmission, OfAnAreaLightLeavesItsSurfaceWithACosineLobe) {
 TEST(PhotonEmission, OfATexturedEmitterFollowsItsTexture) {
   Scene scene = room(glm::vec3(2.0F));
   scene.textures.resize(1);
-  scene.textures[0].image = Image<Rgba8>({4, 4}, {0, 0, 0, 255});
-  for (int i = 0; i < 4; ++i) scene.textures[0].image.at(i, i) = {255, static_cast<std::uint8_t>(60 * i), 0, 255};
+  Image<Rgba8> image({4, 4}, {0, 0, 0, 255});
+  for (int i = 0; i < 4; ++i) image.at(i, i) = {255, static_cast<std::uint8_t>(60 * i), 0, 255};
+  scene.textures[0].image = std::move(image);
   scene.materials[1].emissive_texture.texture = 0;
   const LightSampler lights(scene);
   const glm::dvec3 flux = mean_flux(lights);

@@ -126,7 +126,8 @@ glm::dvec3 by_photons(const Eye& eye, const PhotonMap& caustic, const PhotonMap&
     const Bsdf bsdf(at->material, at->surface);
     light += throughput * direct_light(eye, *at, bsdf, sampler);
     for (const PhotonMap* map : {&caustic, &global})
-      light += throughput * gather_photons(*map, at->surface, bsdf, at->material.normal, eye.cutoff(), found);
+      light +=
+          throughput * gather_photons(*map, map->radius(), at->surface, bsdf, at->material.normal, eye.cutoff(), found);
     const auto followed = [&](Lobe lobe) { return is_followed(bsdf, lobe, eye.cutoff()); };
     if (!eye.go_on(*at, bsdf, followed, sampler, throughput, origin, direction)) break;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <glm/common.hpp>
 #include <utility>
 #include <vector>
 
@@ -43,6 +44,35 @@ std::uint32_t to_bits(double x) {
   return static_cast<std::uint32_t>(number) & ((1U << kBits) - 1U);
 }
 
+/// The packed normal, not of unit length.
+glm::dvec3 unpack_facing(std::uint32_t packed) {
+  const auto number = [](std::uint32_t bits) { return static_cast<std::int32_t>(bits << 20U) >> 20; };
+  const double x = number(packed) / 2047.0;
+  const double y = number(packed >> 12U) / 2047.0;
+  const double z = 1.0 - std::abs(x) - std::abs(y);
+  const double fold = z < 0.0 ? -z : 0.0;
+  return {x - std::copysign(fold, x), y - std::copysign(fold, y), z};
+}
+
+/// A hash of the cell a photon lies in and of the side of a cube that its surface faces most.
+std::uint64_t cell_hash(const Photon& photon, double cells_per_unit) {
+  constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15U;  // 2^64 / the golden ratio, odd
+  const glm::dvec3 facing = unpack_facing(photon.facing);
+  const glm::dvec3 size = glm::abs(facing);
+  const int other = size.y >= size.z ? 1 : 2;
+  const int axis = size.x >= size[other] ? 0 : other;
+  std::uint64_t hash = static_cast<std::uint64_t>(2 * axis + (facing[axis] < 0.0 ? 1 : 0)) * kGolden;
+  for (const float coordinate : photon.position) {
+    const double cell = std::floor(static_cast<double>(coordinate) * cells_per_unit);
+    // NaN and what lies far out: any number serves.
+    const auto number = static_cast<std::int64_t>(std::abs(cell) < 0x1p62 ? cell : 0.0);
+    hash = (hash ^ static_cast<std::uint64_t>(number)) * kGolden;
+    hash ^= hash >> 32U;
+  }
+  hash *= kGolden;
+  return hash ^ (hash >> 32U);
+}
+
 bool finite(const std::array<float, 3>& v) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
@@ -67,10 +97,7 @@ PhotonMap::PhotonMap(std::span<const Photon> photons, const RaySpace& space, dou
   }
   const double scaled = std::max(radius * space.scale, kMinRadius);
   radius_ = scaled / space.scale;
-  density_ = 2.0 / (std::numbers::pi * radius_ * radius_) * flux_unit;
-  radius2_ = scaled * scaled;
-  inverse_radius2_ = 1.0 / radius2_;
-  flatness_ = kFlatness * scaled + 2.0 * kFloatStep;  // what float positions may stray from their plane
+  flux_unit_ = flux_unit;
   cells_per_unit_ = 1.0 / (scaled * kCellPerRadius);
   const int bits = std::max(static_cast<int>(std::bit_width(photons.size() - 1)), kMinSlotBits);
   slots_ = std::uint32_t{1} << static_cast<unsigned>(bits);
@@ -120,7 +147,11 @@ void PhotonMap::sort(std::span<const Photon> photons) {
   std::fill_n(positions_.get() + size_ + again, kReadBeyond, PhotonPlace{});
 }
 
-void PhotonMap::find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer,
+double PhotonMap::density(double radius) const {
+  return radius > 0.0 ? 2.0 / (std::numbers::pi * radius * radius) * flux_unit_ : 0.0;
+}
+
+void PhotonMap::find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer, double radius,
                      FoundPhotons& found) const {
   found.count = 0;
   if (size_ == 0) return;
@@ -138,10 +169,11 @@ void PhotonMap::find(const glm::dvec3& position, const glm::dvec3& normal, std::
   search.last_slot = slots_ - 1;
   search.normal = normal;
   search.layer = layer;
-  search.radius2 = radius2_;
-  search.inverse_radius2 = inverse_radius2_;
+  const double scaled = std::max(radius * space_.scale, kMinRadius);
+  search.radius2 = scaled * scaled;
+  search.inverse_radius2 = 1.0 / search.radius2;
   search.cells_per_unit = cells_per_unit_;
-  search.flatness = flatness_;
+  search.flatness = kFlatness * scaled + 2.0 * kFloatStep;  // what float positions may stray from their plane
   search.min_cosine2 = kMinCosine2;
   find_photons(search, starts_.get(), positions_.get(), found);
 }
@@ -184,6 +216,44 @@ double first_radius(std::span<const Photon> photons, const RaySpace& space, doub
   const double area_of_one = *median / (static_cast<double>(k) - 1.0 / 3.0) / thinning;
   const double radius = std::sqrt(wanted * area_of_one);
   return (radius > 0.0 ? std::min(radius, most) : most) / space.scale;
+}
+
+double PhotonMaps::sparse_radius(const PhotonMap& map, double distance, double pdf) const {
+  const double narrow = pdf > 0.0 ? std::min(1.0, 1.0 / std::sqrt(std::numbers::pi * pdf)) : 1.0;
+  return std::clamp(footprint * distance * narrow, std::min(global.radius(), map.radius()), map.radius());
+}
+
+std::vector<Photon> extract_sparse(std::vector<Photon>& photons, const RaySpace& space, double width,
+                                   std::uint32_t few) {
+  const double cells_per_unit = 1.0 / (width * space.scale);
+  // A table with open addressing, half of it used at the most. Cells of one hash are one cell to it.
+  struct Cell {
+    std::uint32_t hash = 0;
+    std::uint32_t photons = 0;
+  };
+  const auto bits = static_cast<unsigned>(std::bit_width(2 * photons.size() + 1));
+  std::vector<Cell> cells(std::size_t{1} << bits);
+  std::vector<std::uint32_t> cell_of(photons.size());
+  for (std::size_t i = 0; i < photons.size(); ++i) {
+    const std::uint64_t hash = cell_hash(photons[i], cells_per_unit);
+    const auto low = static_cast<std::uint32_t>(hash);
+    std::size_t slot = hash >> (64U - bits);
+    while (cells[slot].photons > 0 && cells[slot].hash != low) slot = (slot + 1) % cells.size();
+    cells[slot].hash = low;
+    ++cells[slot].photons;
+    cell_of[i] = static_cast<std::uint32_t>(slot);
+  }
+  std::vector<Photon> sparse;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < photons.size(); ++i) {
+    if (cells[cell_of[i]].photons < few) {
+      sparse.push_back(photons[i]);
+    } else {
+      photons[kept++] = photons[i];
+    }
+  }
+  photons.resize(kept);
+  return sparse;
 }
 
 }  // namespace hpr

@@ -95,10 +95,15 @@ class PhotonMap {
   /// They are weighted by Epanechnikov's kernel 2 / (pi r^2) (1 - d^2 / r^2), of which density() is the factor: of all
   /// kernels the one with the least mean squared error (Epanechnikov 1969), no root is needed, and it falls to zero at
   /// the rim, so that what lies there matters little and pictures are continuous.
-  void find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const;
+  void find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer, FoundPhotons& found) const {
+    find(position, normal, layer, radius_, found);
+  }
+  /// Within `radius` metres, at most the map's own.
+  void find(const glm::dvec3& position, const glm::dvec3& normal, std::uint8_t layer, double radius,
+            FoundPhotons& found) const;
 
-  /// W/m^2 per flux unit: times this, the sum of weights and fluxes is an irradiance.
-  [[nodiscard]] double density() const { return density_; }
+  /// W/m^2 per flux unit: times this, the sum of the weights and fluxes found within `radius` is an irradiance.
+  [[nodiscard]] double density(double radius) const;
 
   /// By FoundPhotons::index.
   [[nodiscard]] const PhotonLight* lights() const { return lights_.get(); }
@@ -116,7 +121,7 @@ class PhotonMap {
       const glm::dvec3 flux(light.flux[0], light.flux[1], light.flux[2]);
       sum += static_cast<double>(found.weight[i]) * flux * value(unpack_direction(light.direction));
     }
-    return sum * density_;
+    return sum * density(radius_);
   }
 
   /// How many photons such a gather counts.
@@ -153,12 +158,8 @@ class PhotonMap {
   RaySpace space_;
   std::size_t size_ = 0;
   double radius_ = 0.0;
-  double density_ = 0.0;  ///< kernel's factor, W/m^2 per flux unit
-  // In ray space:
-  double radius2_ = 0.0;
-  double inverse_radius2_ = 0.0;
-  double flatness_ = 0.0;
-  double cells_per_unit_ = 0.0;
+  double flux_unit_ = 1.0;
+  double cells_per_unit_ = 0.0;  ///< in ray space
 
   std::uint32_t slots_ = 0;  ///< a power of two
   std::uint32_t row_step_ = 0;
@@ -174,7 +175,22 @@ struct PhotonMaps {
   PhotonMap caustic;
   PhotonMap global;   ///< less the photons that come from nearer than that:
   double near = 0.0;  ///< metres; 0: all photons are there
+  /// The global photons that lie where few do and where fewer do, in place of `global`; see sparse_radius().
+  std::array<PhotonMap, 2> sparse;
+  double footprint = 0.0;  ///< radians about a ray of a direction chosen by the cosine that its footprint covers
+
+  /// The radius in which the photons of `map`, one of the sparse ones, are looked up at a place that a ray reached:
+  /// within `global`'s own they would be met so seldom that one makes a pixel bright. As wide as the ray's footprint
+  /// allows, `distance` metres long and of a direction chosen with density `pdf` per solid angle (0: the only one), and
+  /// no wider than the map's.
+  [[nodiscard]] double sparse_radius(const PhotonMap& map, double distance, double pdf) const;
 };
+
+/// Moves out of `photons` those that are fewer than `few` in their cell of a grid `width` metres wide, of those whose
+/// surfaces face about the same way. Which these are does not depend on their light, so the light of both parts, each
+/// spread as far as suits it, is that of all.
+[[nodiscard]] std::vector<Photon> extract_sparse(std::vector<Photon>& photons, const RaySpace& space, double width,
+                                                 std::uint32_t few);
 
 /// Radius of pass `pass` (from 0) of a progressive estimate: r_i^2 = r_0^2 prod_{k=1..i} (k + a) / (k + 1), a = 2/3
 /// (Knaus and Zwicker 2011, equation 15: variance and expected error of the passes' mean both vanish). Steps: `pass`.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <numbers>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -111,6 +113,81 @@ TEST(PhotonMapTest, AGatherEqualsTheSumOverAllPhotons) {
     }
   }
   EXPECT_GT(found, 100000U);
+}
+
+TEST(PhotonMapTest, AGatherFromLessFarIsThatOfAMapSoNarrow) {
+  const std::vector<Photon> all = random_photons(20000, 5);
+  const PhotonMap wide(all, kRoom, 0.5);
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> side(-1.0, 1.0);
+  for (const double radius : {0.02, 0.11, 0.5}) {
+    const PhotonMap narrow(all, kRoom, radius);
+    EXPECT_EQ(wide.density(radius), narrow.density(narrow.radius()));
+    std::size_t met = 0;
+    for (int i = 0; i < 200; ++i) {
+      const glm::dvec3 position(side(random), -1.0, side(random));
+      FoundPhotons from_wide;
+      FoundPhotons from_narrow;
+      wide.find(position, kUp, 0, radius, from_wide);
+      narrow.find(position, kUp, 0, from_narrow);
+      EXPECT_EQ(from_wide.count, from_narrow.count);
+      const auto sum = [](const FoundPhotons& found) {
+        return std::accumulate(found.weight.begin(), found.weight.begin() + static_cast<std::ptrdiff_t>(found.count),
+                               0.0);
+      };
+      EXPECT_NEAR(sum(from_wide), sum(from_narrow), 1e-4 * static_cast<double>(from_wide.count));
+      met += from_wide.count;
+    }
+    EXPECT_GT(met, 100U) << radius;
+  }
+}
+
+TEST(PhotonMapTest, SparsePhotonsAreThoseWithFewOthersAboutThatFaceAsTheyDo) {
+  std::vector<Photon> photons;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> within(0.01, 0.24);
+  const auto add = [&](int count, const glm::dvec3& corner, const glm::dvec3& normal) {
+    for (int i = 0; i < count; ++i) {
+      photons.push_back(photon_at(corner + glm::dvec3(within(random), 0.1, within(random)), normal,
+                                  glm::dvec3(static_cast<double>(photons.size()))));
+    }
+  };
+  add(5, {0.0, 0.0, 0.0}, kUp);
+  add(4, {0.0, 0.0, 0.0}, -kUp);  // the other side of a thin floor
+  add(4, {0.25, 0.0, 0.0}, kUp);
+  add(1, {-0.5, 0.0, -0.25}, {1.0, 0.0, 0.0});
+  add(900, {-0.25, 0.0, -0.25}, glm::normalize(glm::dvec3(0.2, 1.0, -0.3)));
+  const auto numbers = [](std::span<const Photon> of) {
+    std::vector<int> found;
+    for (const Photon& photon : of) found.push_back(static_cast<int>(photon.flux[0]));
+    return found;
+  };
+  std::vector<Photon> dense = photons;
+  const std::vector<int> sparse = numbers(extract_sparse(dense, kRoom, 0.25, 5));
+  EXPECT_EQ(sparse, (std::vector<int>{5, 6, 7, 8, 9, 10, 11, 12, 13}));
+  std::vector<int> others{0, 1, 2, 3, 4};
+  for (int i = 14; i < 914; ++i) others.push_back(i);
+  EXPECT_EQ(numbers(dense), others);
+
+  std::vector<Photon> none;
+  EXPECT_TRUE(extract_sparse(none, kRoom, 0.25, 5).empty());
+  std::vector<Photon> odd(3, photon_at({std::numeric_limits<double>::quiet_NaN(), 0.0, 1e30}));
+  EXPECT_EQ(extract_sparse(odd, kRoom, 0.25, 5).size() + odd.size(), 3U);
+}
+
+TEST(PhotonMapTest, SparsePhotonsAreLookedUpAsFarAsARaysFootprintGoes) {
+  const std::vector<Photon> photons = random_photons(10, 1);
+  PhotonMaps maps;
+  maps.global = PhotonMap(photons, kRoom, 0.01);
+  maps.footprint = 0.25;
+  const PhotonMap& sparse = maps.sparse[1] = PhotonMap(photons, kRoom, 0.08);
+  const double even = 1.0 / std::numbers::pi;  // straight off a matte surface
+  EXPECT_NEAR(maps.sparse_radius(sparse, 0.2, even), 0.05, 1e-12);
+  EXPECT_NEAR(maps.sparse_radius(sparse, 0.2, 0.0), 0.05, 1e-12);
+  EXPECT_NEAR(maps.sparse_radius(sparse, 0.2, 0.1 * even), 0.05, 1e-12);
+  EXPECT_NEAR(maps.sparse_radius(sparse, 0.2, 4.0 * even), 0.025, 1e-12) << "of a narrow lobe";
+  EXPECT_EQ(maps.sparse_radius(sparse, 100.0, even), sparse.radius());
+  EXPECT_EQ(maps.sparse_radius(sparse, 1e-3, even), maps.global.radius());
 }
 
 TEST(PhotonMapTest, AnEvenlyLitPlaneHasItsFluxOverItsArea) {

@@ -328,7 +328,7 @@ glm::dvec3 reflect_photons_by_lobes(std::span<const Lobe> lobes, const Bsdf& bsd
 
 }  // namespace
 
-glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, const Bsdf& bsdf,
+glm::dvec3 gather_photons(const PhotonMap& map, double radius, const SurfacePoint& surface, const Bsdf& bsdf,
                           const glm::dvec3& shading_normal, double glossy_cutoff, FoundPhotons& found) {
   if (map.size() == 0) return glm::dvec3(0.0);
   // Transmission is always followed, so photons count on the viewer's side alone.
@@ -337,7 +337,7 @@ glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, con
   const bool specular = gathers(Lobe::Reflection);
   const bool coat = gathers(Lobe::Coat);
   if (!diffuse && !specular && !coat) return glm::dvec3(0.0);
-  map.find(surface.position, surface.geometric_normal, surface.layer, found);
+  map.find(surface.position, surface.geometric_normal, surface.layer, radius, found);
   if (found.count == 0) return glm::dvec3(0.0);
   const bool leans = shading_normal != surface.geometric_normal;
   glm::dvec3 reflected(0.0);
@@ -349,7 +349,7 @@ glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, con
   } else {
     reflected = reflect_photons(bsdf.reflection_terms(diffuse, specular), leans, map.lights(), found);
   }
-  const glm::dvec3 light = map.density() * reflected;
+  const glm::dvec3 light = map.density(radius) * reflected;
   const double sum = light.r + light.g + light.b;
   return std::isfinite(sum) ? light : glm::dvec3(0.0);
 }

@@ -62,8 +62,10 @@ void find_photons(const PhotonSearch& search, const std::uint32_t* starts, const
                                          FoundPhotons& found);
 
 /// The radiance towards the viewer that the lobes not followed make of the photons about `surface`. `bsdf` is of that
-/// surface with the normal `shading_normal`, and carries radiance. Never NaN. `found` is overwritten.
-[[nodiscard]] glm::dvec3 gather_photons(const PhotonMap& map, const SurfacePoint& surface, const Bsdf& bsdf,
-                                        const glm::dvec3& shading_normal, double glossy_cutoff, FoundPhotons& found);
+/// surface with the normal `shading_normal`, and carries radiance. Within `radius` metres, at most the map's own. Never
+/// NaN. `found` is overwritten.
+[[nodiscard]] glm::dvec3 gather_photons(const PhotonMap& map, double radius, const SurfacePoint& surface,
+                                        const Bsdf& bsdf, const glm::dvec3& shading_normal, double glossy_cutoff,
+                                        FoundPhotons& found);
 
 }  // namespace hpr

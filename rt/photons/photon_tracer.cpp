@@ -141,18 +141,20 @@ TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
   KeptPhotons kept(settings_.max_kept);
-  rays_.for_each(settings_.threads, count, [&](std::size_t i) {
+  const auto trace_block = [&](std::size_t i) {
     if (is_overtaken && is_overtaken()) return;
     const DenormalsAsZero mode;
     Block block;
     const std::uint64_t before = i * kBlockPhotons;
     start(stream, {range.first + before, std::min(kBlockPhotons, range.count - before)},
           1.0 / static_cast<double>(pass_photons), block);
-    while (!block.flights.empty()) move(block);
+    block.batch.purpose = {RayKind::Photon};
+    for (; !block.flights.empty(); ++block.batch.purpose.generation) move(block);
     block.sort();
     kept.add(block.traced.caustic.size() + block.traced.global.size());
     traced[i] = std::move(block.traced);
-  });
+  };
+  rays_.for_each(settings_.threads, count, trace_block, CallMemory::Small);
   TracedPhotons all;
   for (const TracedPhotons& part : traced) {
     append(all.caustic, part.caustic);
@@ -205,7 +207,7 @@ void PhotonTracer::move(Block& block) const {
   block.traced.counts.rays += block.flights.size();
   block.traced.counts.invalid +=
       has_coverage_ ? rays_.closest(block.batch, block.met, block.hits) : rays_.closest(block.batch, block.hits);
-  surfaces_.prefetch(block.hits);
+  surfaces_.prefetch(block.hits, block.batch.purpose.generation);
   block.next.clear();
   for (std::size_t i = 0; i < block.flights.size(); ++i) {
     if (block.hits[i] == kNoSurface) continue;
@@ -355,6 +357,18 @@ constexpr double kFootprints = 2.0;
 /// Light that comes to a surface from within so many radii is too uneven for photons that are gathered.
 constexpr double kNearRadii = 2.0;
 
+/// Of what a radius takes in, what is enough for caustics alone: their edges show what wide radii blur, and all other
+/// light has more noise.
+constexpr double kCausticFraction = 1.0 / 16.0;
+
+/// Photons that are gathered are sparse where a cell so many radii wide holds fewer than kSparse, a fifth of what it
+/// holds where most lie, and are looked up from up to so far; sparser ones by cells of the square of that. With fewer
+/// to a cell, chance would leave photons dense among sparse ones, and each of them bright.
+constexpr double kSparseRadii = 8.0;
+constexpr std::uint32_t kSparse = 16;
+/// Radians about a ray that gathers, in the first sample: what it blurs the surface that it gathers for does not show.
+constexpr double kFootprint = 0.25;
+
 constexpr std::uint32_t kPilotPhotons = 4096;
 constexpr double kPilotDense = 12.0;
 /// No more are sent for than so many in the footprint; where more are to be gathered, radii are wider.
@@ -474,18 +488,24 @@ bool PhotonMapBuilder::fit_count(Communicator* comm, const std::function<bool()>
   return true;
 }
 
-/// `footprint`: metres of a pixel; 0: of no concern.
-double PhotonMapBuilder::choose_radius(std::span<const Photon> first, double footprint) const {
+/// `footprint`: metres of a pixel; 0: of no concern. `gathered`: photons that it takes in, at least.
+double PhotonMapBuilder::choose_radius(std::span<const Photon> first, double footprint, double gathered) const {
   if (settings_.photon_radius > 0.0) return settings_.photon_radius;
   const double dense = first_radius(first, space_, kDense);
   if (!(settings_.photon_footprint > 0.0)) return dense;
-  const double wanted = dense * std::sqrt(settings_.photons_gathered / kDense);
+  const double wanted = dense * std::sqrt(gathered / kDense);
   return std::min(std::max(dense, wanted), std::max(kFootprints * footprint, wanted));
 }
 
 void PhotonMapBuilder::choose_radii(const TracedPhotons& first) {
-  caustic_radius_ = choose_radius(first.caustic, settings_.photon_footprint);
-  global_radius_ = choose_radius(first.global, use_ == PhotonUse::Direct ? settings_.photon_footprint : 0.0);
+  const double gathered = settings_.photons_gathered;
+  if (use_ == PhotonUse::Direct) {
+    caustic_radius_ = choose_radius(first.caustic, settings_.photon_footprint, gathered);
+    global_radius_ = choose_radius(first.global, settings_.photon_footprint, gathered);
+  } else {
+    caustic_radius_ = choose_radius(first.caustic, settings_.photon_footprint, kCausticFraction * gathered);
+    global_radius_ = choose_radius(first.global, 0.0, gathered);
+  }
 }
 
 const PhotonMaps& PhotonMapBuilder::build(const SampleNumber& number, Communicator* comm) {
@@ -496,6 +516,23 @@ const PhotonMaps& PhotonMapBuilder::build(const SampleNumber& number, Communicat
 bool PhotonMapBuilder::build_while_wanted(const SampleNumber& number, Communicator& comm,
                                           const std::function<bool()>& is_overtaken) {
   return make(number, &comm, is_overtaken);
+}
+
+/// Moves the photons that lie where few do to maps of their own. `radius`: in which this sample's others are gathered.
+void PhotonMapBuilder::map_sparse(std::vector<Photon>& photons, double radius) {
+  maps_.footprint = kFootprint * radius / global_radius_;
+  double radii = 1.0;
+  std::vector<Photon>* from = &photons;
+  std::array<std::vector<Photon>, std::tuple_size_v<decltype(maps_.sparse)>> sparse;
+  for (std::vector<Photon>& sparser : sparse) {
+    radii *= kSparseRadii;
+    // Of the first sample's radius: with the radii of later ones all photons would be sparse.
+    sparser = extract_sparse(*from, space_, radii * global_radius_, kSparse);
+    from = &sparser;
+  }
+  for (std::size_t i = sparse.size(); i-- > 0; radii /= kSparseRadii) {
+    maps_.sparse.at(i) = PhotonMap(sparse.at(i), space_, radii * radius, tracer_.settings().flux_unit);
+  }
 }
 
 bool PhotonMapBuilder::make(const SampleNumber& number, Communicator* comm, const std::function<bool()>& is_overtaken) {
@@ -516,6 +553,7 @@ bool PhotonMapBuilder::make(const SampleNumber& number, Communicator* comm, cons
   const double global = progressive_radius(global_radius_, number.sample);
   maps_.near = use_ == PhotonUse::Gathered ? kNearRadii * global : 0.0;
   std::erase_if(traced->global, [&](const Photon& photon) { return photon.traveled < maps_.near; });
+  if (use_ == PhotonUse::Gathered) map_sparse(traced->global, global);
   parallel_for(settings_.threads, 2, [&](std::size_t which) {
     const std::vector<Photon>& photons = which == 0 ? traced->caustic : traced->global;
     PhotonMap& map = which == 0 ? maps_.caustic : maps_.global;

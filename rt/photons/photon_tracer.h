@@ -129,7 +129,7 @@ enum class PhotonUse : std::uint8_t { Direct, Gathered };
 /// Where the settings know what a pixel covers, radii begin at two pixels: within them light that things keep off a
 /// surface, or that ends at its edge, is missing, and wide ones show as dark rims. As many photons are sent as that
 /// takes. Where they are too few, wider radii take in at least four of them, and so do those of photons that are
-/// gathered.
+/// gathered; beside these caustics have radii that take in a sixteenth of that.
 class PhotonMapBuilder {
  public:
   /// All that is referred to must outlive this. `rays` holds the whole scene.
@@ -158,7 +158,8 @@ class PhotonMapBuilder {
                                                    const std::function<bool()>& is_overtaken);
   [[nodiscard]] bool make(const SampleNumber& number, Communicator* comm, const std::function<bool()>& is_overtaken);
   [[nodiscard]] bool fit_count(Communicator* comm, const std::function<bool()>& is_overtaken);
-  [[nodiscard]] double choose_radius(std::span<const Photon> first, double footprint) const;
+  [[nodiscard]] double choose_radius(std::span<const Photon> first, double footprint, double gathered) const;
+  void map_sparse(std::vector<Photon>& photons, double radius);
   void choose_radii(const TracedPhotons& first);
 
   RaySpace space_;

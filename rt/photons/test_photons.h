@@ -45,10 +45,7 @@ inline Material clear_glass() {
 /// A scene with all that photons need.
 struct PhotonRoom {
   explicit PhotonRoom(Scene built)
-      : scene((finish_scene(built), std::move(built))),
-        space(scene.bounds),
-        surfaces(scene, space),
-        rays(scene, space, 1) {}
+      : scene((finish_scene(built), std::move(built))), space(scene), surfaces(scene, space), rays(scene, space, 1) {}
 
   [[nodiscard]] PhotonTracer tracer(PhotonSource source, const PhotonSettings& settings = {}) const {
     return PhotonTracer(scene, surfaces, space, rays, std::move(source), settings);

@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
-#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "rt/materials/medium.h"
 #include "rt/photons/photon_query.h"
 #include "rt/ray_counts.h"
+#include "rt/scratch_pool.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 
@@ -108,6 +108,7 @@ class PathWavefront {
   std::vector<std::uint32_t> hits_;
   std::vector<float> passed_;  ///< per shadow ray: the share of its light that gets through
   TraversalScratch scratch_;
+  std::uint16_t generation_ = 0;  ///< of the rays under way
   WorldTriangle triangle_;
 };
 
@@ -213,7 +214,7 @@ void PathWavefront::add(const Path& path) {
 
 void PathWavefront::run() {
   const auto some_left = [&] { return std::ranges::any_of(paths_, [](const auto& paths) { return !paths.empty(); }); };
-  while (some_left()) {
+  for (generation_ = 0; some_left(); ++generation_) {
     for (auto& paths : next_) paths.clear();
     shadows_.clear();
     trace_paths();
@@ -231,6 +232,7 @@ void PathWavefront::trace_paths() {
     }
   }
   hits_.resize(requests_.size());
+  scratch_.batch.purpose = {generation_ == 0 ? RayKind::Primary : RayKind::Bounce, generation_};
   counts_.invalid += shared_.rays.closest(requests_, hits_, scratch_);
   counts_.primary += paths_[0].size();
   counts_.diffuse += paths_[kind_of(Lobe::Diffuse)].size();
@@ -404,6 +406,7 @@ void PathWavefront::trace_shadows() {
   for (const ShadowRay& ray : shadows_) requests_.push_back({ray.origin, ray.direction, ray.reach, nullptr, ray.pixel});
   counts_.shadow += shadows_.size();
   passed_.resize(requests_.size());
+  scratch_.batch.purpose = {RayKind::Shadow, static_cast<std::uint16_t>(generation_ + 1)};
   counts_.invalid += shared_.rays.passed(requests_, passed_, scratch_);
   for (std::size_t i = 0; i < shadows_.size(); ++i) {
     if (passed_[i] > 0.0F) radiance_[shadows_[i].pixel] += static_cast<double>(passed_[i]) * shadows_[i].radiance;
@@ -463,26 +466,30 @@ struct PathTracer::State {
 
   PathScene shared;
   MediumFinder media;
-  std::vector<std::unique_ptr<PathWavefront>> idle;  ///< kept from tile to tile: fresh pages cost time
-  std::mutex mutex;
+  ScratchPool<PathWavefront> waves;
   PathCounts counts;
 
-  std::unique_ptr<PathWavefront> take_wave();
+  void add_paths(PathWavefront& wave, const View& view, const Media& eye, const Rect& tile, const Rect& rows,
+                 const SampleNumber& number, std::span<const std::uint8_t> wanted) const;
   void trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& location,
                   const SampleNumber& number, std::span<const std::uint8_t> wanted, std::span<Rgb> pixels,
                   std::span<float> coverage) const;
 };
 
-std::unique_ptr<PathWavefront> PathTracer::State::take_wave() {
-  {
-    const std::lock_guard lock(mutex);
-    if (!idle.empty()) {
-      std::unique_ptr<PathWavefront> wave = std::move(idle.back());
-      idle.pop_back();
-      return wave;
+/// Starts the paths of some rows of a tile, of pixels that are wanted.
+void PathTracer::State::add_paths(PathWavefront& wave, const View& view, const Media& eye, const Rect& tile,
+                                  const Rect& rows, const SampleNumber& number,
+                                  std::span<const std::uint8_t> wanted) const {
+  wave.start(view, static_cast<std::size_t>(rows.height()) * kTileSide);
+  for (int y = rows.y0; y < rows.y1; ++y) {
+    for (int x = rows.x0; x < rows.x1; ++x) {
+      const auto pixel = static_cast<std::size_t>(y - tile.y0) * kTileSide + static_cast<std::size_t>(x - tile.x0);
+      if (!wanted.empty() && wanted[pixel] == 0) continue;
+      Path path = path_from_eye(view, eye, shared.settings, x, y, number);
+      path.pixel = static_cast<std::uint32_t>((y - rows.y0) * kTileSide + x - tile.x0);
+      wave.add(path);
     }
   }
-  return std::make_unique<PathWavefront>(shared);
 }
 
 void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const Media& eye, const TilePlace& location,
@@ -494,16 +501,7 @@ void PathTracer::State::trace_tile(PathWavefront& wave, const View& view, const 
   const Rect& rect = location.pixels;
   for (int top = rect.y0; top < rect.y1; top += kRowsAtOnce) {
     const int bottom = std::min(top + kRowsAtOnce, rect.y1);
-    wave.start(view, static_cast<std::size_t>(bottom - top) * kTileSide);
-    for (int y = top; y < bottom; ++y) {
-      for (int x = rect.x0; x < rect.x1; ++x) {
-        const auto pixel = static_cast<std::size_t>(y - rect.y0) * kTileSide + static_cast<std::size_t>(x - rect.x0);
-        if (!wanted.empty() && wanted[pixel] == 0) continue;
-        Path path = path_from_eye(view, eye, shared.settings, x, y, number);
-        path.pixel = static_cast<std::uint32_t>((y - top) * kTileSide + x - rect.x0);
-        wave.add(path);
-      }
-    }
+    add_paths(wave, view, eye, rect, {rect.x0, top, rect.x1, bottom}, number, wanted);
     wave.run();
     for (int y = top; y < bottom; ++y) {
       for (int x = 0; x < rect.width(); ++x) {
@@ -522,8 +520,8 @@ PathTracer::PathTracer(const Scene& scene, const CoverageTraversal& rays, const 
           PathScene{.scene = scene,
                     .rays = rays,
                     .lights = lights,
-                    .space = RaySpace(scene.bounds),
-                    .surfaces = Surfaces(scene, RaySpace(scene.bounds), true, others),
+                    .space = RaySpace(scene),
+                    .surfaces = Surfaces(scene, RaySpace(scene), true, others),
                     .settings = settings,
                     .has_single_sided = !std::ranges::all_of(scene.materials, shows_both_sides)})) {}
 PathTracer::~PathTracer() = default;
@@ -542,21 +540,21 @@ void PathTracer::trace(std::span<const View> views, std::span<const std::size_t>
 
   State& state = *state_;
   const std::vector<Media> eyes = state.media.of_eyes(views);
-  state.shared.rays.opaque().for_each(state.shared.settings.threads, tiles.size(), [&](std::size_t i) {
+  const auto trace_one = [&](std::size_t i) {
     const std::size_t tile = tiles[i];
     const trace::Span span("path trace tile", "tile", tile);
     const TilePlace location = layout.place(tile);
     output.radiance->set_active(tile);
     if (output.coverage != nullptr) output.coverage->set_active(tile);
-    std::unique_ptr<PathWavefront> wave = state.take_wave();
+    std::unique_ptr<PathWavefront> wave = state.waves.take(state.shared);
     state.trace_tile(*wave, views[location.screen], eyes[location.screen], location, number, mask_of(wanted, tile),
                      output.radiance->tile(tile),
                      output.coverage != nullptr ? output.coverage->tile(tile) : std::span<float>());
-    const std::lock_guard lock(state.mutex);
-    state.idle.push_back(std::move(wave));
-  });
+    state.waves.put_back(std::move(wave));
+  };
+  state.shared.rays.opaque().for_each(state.shared.settings.threads, tiles.size(), trace_one, CallMemory::Small);
   state.counts = {};
-  for (const auto& wave : state.idle) {
+  for (const auto& wave : state.waves.all()) {
     state.counts += wave->counts();
     wave->counts() = {};
   }

@@ -72,7 +72,7 @@ struct PathOutput {
 /// A sample depends on its number, its pixel and its view only: threads, tile lists and ranks change no bit.
 class PathTracer {
  public:
-  /// `rays` goes through `scene` in RaySpace(scene.bounds). All must outlive this.
+  /// `rays` goes through `scene` in RaySpace(scene). All must outlive this.
   PathTracer(const Scene& scene, const CoverageTraversal& rays, const LightSampler& lights, PathSettings settings,
              RayForwarding* others = nullptr);
   ~PathTracer();

@@ -17,7 +17,7 @@ namespace hpr::test {
 struct PathBench {
   explicit PathBench(const Scene& traced)
       : scene(traced),
-        space(traced.bounds),
+        space(traced),
         surfaces(traced, space),
         opaque(traced, space, 1, covering_surfaces(traced, false)),
         alpha_tested(traced, space, 1, covering_surfaces(traced, true)),

@@ -135,6 +135,7 @@ class ShownRows {
     });
     std::vector<std::uint32_t> surfaces(buffers_.requests.size());
     buffers_.counts.primary += surfaces.size();
+    buffers_.scratch.batch.purpose = {RayKind::Primary};
     buffers_.counts.invalid += context_.rays->count_surfaces(buffers_.requests, surfaces, buffers_.scratch);
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       sums_.radiance[buffers_.requests[i].owner] = to_vector(count_color(surfaces[i], kMaxOverdraw));
@@ -158,6 +159,7 @@ class ShownRows {
     }
     std::vector<float> passed(buffers_.requests.size());
     buffers_.counts[PassId::AmbientOcclusion] += passed.size();
+    buffers_.scratch.batch.purpose = {RayKind::Occlusion, 1};
     buffers_.counts.invalid += context_.rays->passed(buffers_.requests, passed, buffers_.scratch);
     std::vector<double> open(points_.size(), 0.0);
     for (std::size_t i = 0; i < passed.size(); ++i) open[buffers_.requests[i].owner] += static_cast<double>(passed[i]);

@@ -15,20 +15,17 @@ void CoverageTraversal::push(const RayRequest& ray, RayBatch& batch) const {
   batch.push(space_.from_world(ray.origin), ray.direction, ray.reach * space_.scale, ray.faces);
 }
 
-SurfacePlane CoverageTraversal::plane_of(const WorldTriangle& triangle, const SurfacePoint& point) const {
-  return {point.position, point.geometric_normal, surfaces_.coplanar_tolerance(triangle, point)};
-}
-
 SurfacePlane CoverageTraversal::plane_at(std::uint32_t surface, const RayRequest& ray, WorldTriangle& triangle) const {
   surfaces_.load(surface, triangle);
-  return plane_of(triangle, surfaces_.meet(triangle, ray.origin, ray.direction));
+  return surfaces_.plane(triangle, ray.origin, ray.direction);
 }
 
 CoveringLayer CoverageTraversal::layer_at(std::uint32_t surface, const RayRequest& ray, WorldTriangle& triangle) const {
   surfaces_.load(surface, triangle);
   CoveringLayer layer;
   layer.point = surfaces_.meet(triangle, ray.origin, ray.direction);
-  layer.plane = plane_of(triangle, layer.point);
+  layer.plane = {layer.point.position, layer.point.geometric_normal,
+                 surfaces_.coplanar_tolerance(triangle, layer.point.offset)};
   layer.coverage = evaluate_alpha(scene_, scene_.materials[layer.point.material], layer.point.uv, layer.point.color.a);
   return layer;
 }
@@ -124,7 +121,7 @@ void CoverageTraversal::visit_alpha_tested(std::span<const RayRequest> rays, Tra
     push_waiting(layered, scratch);
     scratch.surfaces.resize(scratch.waiting.size());
     (void)alpha_tested_->closest(scratch.batch, scratch.met, scratch.surfaces);
-    surfaces_.prefetch(scratch.surfaces);
+    surfaces_.prefetch(scratch.surfaces, scratch.batch.purpose.generation);
     std::size_t left = 0;
     for (std::size_t i = 0; i < scratch.waiting.size(); ++i) {
       if (add_layer(i, layered, scratch, triangle, visit)) scratch.waiting[left++] = scratch.waiting[i];
@@ -144,7 +141,7 @@ std::uint64_t CoverageTraversal::closest_opaque(std::span<const RayRequest> rays
 std::uint64_t CoverageTraversal::closest(std::span<const RayRequest> rays, std::span<std::uint32_t> hits,
                                          TraversalScratch& scratch, Coherence coherence) const {
   const std::uint64_t invalid = closest_opaque(rays, hits, scratch, coherence);
-  surfaces_.prefetch(hits);
+  surfaces_.prefetch(hits, scratch.batch.purpose.generation);
   if (alpha_tested_ == nullptr) return invalid;
   WorldTriangle triangle;
   scratch.ends.assign(rays.size(), SurfacePlane{});

@@ -34,14 +34,6 @@ struct RayRequest {
   Faces faces = Faces::Both;   ///< that it meets
 };
 
-/// Where a ray meets a surface, as far as it matters for which of two lies before the other. Those of one plane are
-/// told apart by what they are: the order of a decal and what it is on is no matter of rounding.
-struct SurfacePlane {
-  glm::dvec3 position{0.0};
-  glm::dvec3 normal{0.0};  ///< unit length, on the viewer's side; zero: none
-  double tolerance = 0.0;  ///< metres, see Surfaces::coplanar_tolerance
-};
-
 /// A surface of partial coverage that a ray meets.
 struct CoveringLayer {
   SurfacePlane plane;
@@ -51,7 +43,7 @@ struct CoveringLayer {
 
 /// Memory of one thread, kept from call to call.
 struct TraversalScratch {
-  RayBatch batch;
+  RayBatch batch;  ///< whose purpose the caller sets
   std::vector<std::uint32_t> surfaces;
   std::vector<std::uint8_t> blocked;
   std::vector<std::uint32_t> waiting;
@@ -124,7 +116,6 @@ class CoverageTraversal {
                                WorldTriangle& triangle, const Visit& visit) const;
   [[nodiscard]] CoveringLayer layer_at(std::uint32_t surface, const RayRequest& ray, WorldTriangle& triangle) const;
   [[nodiscard]] double reach_past(const SurfacePlane& end, const RayRequest& ray) const;
-  [[nodiscard]] SurfacePlane plane_of(const WorldTriangle& triangle, const SurfacePoint& point) const;
   void push(const RayRequest& ray, RayBatch& batch) const;
 
   const Scene& scene_;

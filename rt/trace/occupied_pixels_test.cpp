@@ -29,7 +29,7 @@ Scene two_balls() {
 TEST(OccupiedPixels, AreFewMoreThanAMeshCoversHoweverItsTrianglesAreOrdered) {
   const Scene scene = two_balls();
   const View view = test::view_from({0.0, 0.0, 9.0}, {1.0, 0.7, 0.0}, {160, 120}, scene);
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   const FrameLayout layout({view.size()});
   const OccupiedPixels occupied(scene, rays, MeshBoxes(scene), std::span(&view, 1), layout, 0);
   const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));

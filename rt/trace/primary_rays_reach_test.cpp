@@ -26,7 +26,7 @@ TEST(PrimaryRaysReach, PixelsOutOfReachShowNothingOfOthers) {
   const Image<glm::vec3> nowhere({1, 1}, glm::vec3(std::numeric_limits<float>::infinity()));
   view.points = PixelPoints{.map = std::make_shared<PositionMap>(nowhere), .orthographic = true};
 
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   TileLayer<Key> layer(FrameLayout({view.size()}));
   PrimaryRays primary(scene, rays, 1);
   primary.draw(view, 0, std::array{Rect{0, 0, 9, 9}}, layer);
@@ -53,7 +53,7 @@ TEST(PrimaryRaysReach, WhatIsMetNowhereNearItsPlaceHidesNothingBehindIt) {
         scene, test::add_mesh(scene, test::quad(center - along - tilt - side, 2.0 * side, 2.0 * (along + tilt), 0)));
   }
   finish_scene(scene);
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   TileLayer<Key> layer(FrameLayout({view.size()}));
   PrimaryRays primary(scene, rays, 1);
   primary.draw(view, 0, std::array{Rect{0, 0, 64, 64}}, layer);

@@ -64,7 +64,7 @@ struct Drawn {
 };
 
 Drawn draw(const Scene& scene, const View& view, int threads = 1) {
-  const RayScene rays(scene, RaySpace(scene.bounds), threads);
+  const RayScene rays(scene, RaySpace(scene), threads);
   TileLayer<Key> layer(FrameLayout({view.size()}));
   PrimaryRays primary(scene, rays, threads);
   primary.draw(view, 0, std::array{whole(view)}, layer);
@@ -112,7 +112,7 @@ Image<Key> draw_shares(const Scene& scene, const View& view, std::uint32_t ranks
       ranges.push_back({first, std::min(first + run, scene.triangles)});
     }
     std::ranges::reverse(ranges);
-    const RayScene rays(scene, RaySpace(scene.bounds), 1, ranges);
+    const RayScene rays(scene, RaySpace(scene), 1, ranges);
     PrimaryRays(scene, rays, 1).draw(view, 0, std::array{whole(view)}, layer);
   }
   return to_image(layer, 0);
@@ -131,7 +131,7 @@ TEST(PrimaryRays, PartsThreadsAndRepetitionChangeNothing) {
   const Scene scene = mixed_scene();
   const View view = front_view(scene);
   const Image<Key> expected = draw(scene, view).keys;
-  const RayScene rays(scene, RaySpace(scene.bounds), 2);
+  const RayScene rays(scene, RaySpace(scene), 2);
   PrimaryRays primary(scene, rays, 3);
   TileLayer<Key> layer(FrameLayout({{64, 64}, view.size()}));
   std::vector<Rect> parts;
@@ -163,7 +163,7 @@ Scene floating_scene() {
 
 TEST(PrimaryRays, LooksTogetherSeeWhatEachSeesAloneAndMissesNothing) {
   const Scene scene = floating_scene();
-  const RayScene rays(scene, RaySpace(scene.bounds), 2);
+  const RayScene rays(scene, RaySpace(scene), 2);
   PrimaryRays primary(scene, rays, 2);
   std::vector<View> views(11, front_view(scene));
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -193,7 +193,7 @@ TEST(PrimaryRays, APartHoldsNoKeyOutsideOfIt) {
   const Scene scene = mixed_scene();
   const View view = front_view(scene);
   const Image<Key> expected = draw(scene, view).keys;
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   TileLayer<Key> layer(FrameLayout({view.size()}));
   PrimaryRays primary(scene, rays, 1);
   const Rect part{101, 67, 103, 300};
@@ -350,7 +350,7 @@ TEST(PrimaryRays, NothingAndImpossibleEyesSeeNothing) {
   const Drawn drawn = draw(scene, lost);
   EXPECT_EQ(covered(drawn.keys), 0U);
   EXPECT_EQ(drawn.stats.invalid, drawn.stats.rays);
-  const RayScene none(scene, RaySpace(scene.bounds), 1, {});
+  const RayScene none(scene, RaySpace(scene), 1, {});
   TileLayer<Key> layer(FrameLayout({{33, 9}}));
   PrimaryRays(scene, none, 1).draw(front_view(scene, {33, 9}), 0, std::array{Rect{0, 0, 33, 9}}, layer);
   EXPECT_EQ(layer.active_tiles(), 0U);
@@ -366,7 +366,7 @@ TEST(PrimaryRays, OnlyPixelsThatAreWantedHaveKeys) {
     for (std::size_t pixel = 0; pixel < kTilePixels; ++pixel) wanted.tile(tile)[pixel] = pixel % 3 == 0 ? 1 : 0;
     if (tile != 1) wanted.set_active(tile);  // there all are wanted
   }
-  const RayScene rays(scene, RaySpace(scene.bounds), 2);
+  const RayScene rays(scene, RaySpace(scene), 2);
   PrimaryRays primary(scene, rays, 2);
   TileLayer<Key>* const only = &layer;
   primary.draw(std::span(&view, 1), 0, std::array{Rect{0, 0, 150, 90}}, std::span(&only, 1), &wanted);

@@ -316,19 +316,31 @@ RayScene::RayScene(const Scene& scene, const RaySpace& space, int threads, std::
   embree_->failure.check();
 }
 
+std::vector<SurfaceRange> surfaces_at_home(const Scene& scene, const std::optional<std::vector<SurfaceRange>>& part,
+                                           const std::vector<SurfaceRange>& surfaces) {
+  if (scene.part_pages) return {};
+  return part ? common_ranges(merged_ranges(*part, scene.triangles), surfaces) : surfaces;
+}
+
 RayScene::~RayScene() {
   if (forwarding_ != nullptr) forwarding_->remove(part_);
 }
 
-void RayScene::share(RayForwarding& forwarding) {
+void RayScene::share(RayForwarding& forwarding, std::vector<SurfaceRange> surfaces, const RayBuild& build) {
   HPR_CHECK(forwarding_ == nullptr);
-  part_ = forwarding.add(*this);
+  part_ = forwarding.add(*this, std::move(surfaces), build);
   forwarding_ = &forwarding;
 }
 
-void RayScene::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const {
+const RayScene& RayScene::of_page(std::size_t page, int threads) const {
+  HPR_CHECK(forwarding_ != nullptr);
+  return forwarding_->pages()->ray_scene(page, part_, threads);
+}
+
+void RayScene::for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body,
+                        CallMemory memory) const {
   if (forwarding_ != nullptr) {
-    forwarding_->for_each(threads, count, body);
+    forwarding_->for_each(threads, count, body, memory);
   } else {
     parallel_for(threads, count, body);
   }
@@ -400,7 +412,9 @@ bool was_met(const Passed& passed, std::uint32_t surface, std::uint32_t instance
   return distance < passed.distance || (distance == passed.distance && surface < passed.surface);
 }
 
-/// Robust traversal offers candidates at the distance already found as well; of those the lowest surface id stays.
+/// Traversal leaves out boxes that begin beyond the distance found, which rounding may have made shorter than that of a
+/// surface that is met at the same distance. So it goes on a little past what was found, and this decides: the nearest
+/// stays, and of those at one distance that of the lowest surface id, whatever the tree.
 void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
   auto& closest = *reinterpret_cast<Closest*>(arguments->context);
   for (unsigned int i = 0; i < arguments->N; ++i) {
@@ -417,13 +431,15 @@ void keep_lowest_surface(const RTCFilterFunctionNArguments* arguments) {
     const std::uint32_t surface =
         shown.first_surface + shown.triangle_of(RTCHitN_primID(arguments->hit, arguments->N, i));
     const float distance = RTCRayN_tfar(arguments->ray, arguments->N, i);
-    const bool later = distance == closest.distance[lane] && surface >= closest.surface[lane];
+    const bool later =
+        distance > closest.distance[lane] || (distance == closest.distance[lane] && surface >= closest.surface[lane]);
     if (later || (closest.passed != nullptr && was_met(closest.passed[lane], surface, shown.instance, distance))) {
       arguments->valid[i] = 0;
     } else {
       closest.distance[lane] = distance;
       closest.surface[lane] = surface;
       closest.instance[lane] = shown.instance;
+      RTCRayN_tfar(arguments->ray, arguments->N, i) = distance + kSameEdge * std::max(distance, 1.0F);
     }
   }
 }

@@ -11,6 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -30,20 +31,23 @@ inline constexpr double kFloatStep = 1.1920928955078125e-7;
 /// three).
 inline constexpr double kOriginSteps = 4.0;
 
-/// The float coordinates rays are traced in: world metres relative to the scene's centre, scaled by a power of two so
-/// that the scene's radius lies in [1, 2). Both steps are done in double; the scale is exact, so a scene scaled by a
-/// power of two gives the same bits.
+/// The float coordinates rays are traced in: world metres relative to the scene's detail_center, scaled by a power of
+/// two so that the farthest coordinate of the scene lies in [1, 2). Both steps are done in double; the scale is exact,
+/// so a scene scaled by a power of two gives the same bits.
 struct RaySpace {
   glm::dvec3 origin{0.0};
   double scale = 1.0;
-  double radius = 1.0;  ///< the scene's, in ray space: [1, 2)
+  double radius = 1.0;  ///< how far the scene reaches by the largest coordinate, in ray space: [1, 2)
 
   RaySpace() = default;
-  explicit RaySpace(const Bounds& bounds) {
-    const glm::dvec3 half = 0.5 * bounds.high - 0.5 * bounds.low;
-    const double extent = std::max({half.x, half.y, half.z});
+  explicit RaySpace(const Scene& scene) : RaySpace(scene.bounds, scene.detail_center) {}
+  explicit RaySpace(const Bounds& bounds) : RaySpace(bounds, 0.5 * bounds.high + 0.5 * bounds.low) {}
+  RaySpace(const Bounds& bounds, const glm::dvec3& center) {
+    glm::dvec3 reach = 0.5 * bounds.high - 0.5 * bounds.low;
+    if (center != 0.5 * bounds.high + 0.5 * bounds.low) reach = glm::max(bounds.high - center, center - bounds.low);
+    const double extent = std::max({reach.x, reach.y, reach.z});
     if (!std::isfinite(extent)) return;
-    origin = 0.5 * bounds.high + 0.5 * bounds.low;
+    origin = center;
     if (!(extent > 0.0)) return;
     scale = std::ldexp(1.0, std::clamp(-std::ilogb(extent), -1000, 1000));
     radius = extent * scale;
@@ -78,6 +82,23 @@ inline constexpr float kMaxRayDistance = 1.8e18F;
 /// Which faces of single-sided materials (shows_both_sides) a ray meets: both, as light does, or those an eye sees.
 enum class Faces : std::uint32_t { Both, Front };
 
+/// What is asked of other ranks, rays of all kinds and triangles alike.
+enum class RayKind : std::uint16_t {
+  Primary,    ///< what the eye sees
+  Bounce,     ///< from a surface along one of its lobes
+  Shadow,     ///< what hides a light
+  Occlusion,  ///< what is near
+  Photon,
+  Triangles,  ///< of surfaces that another rank holds
+};
+inline constexpr std::size_t kRayKinds = 6;
+
+/// What rays are for. Of those that wait for other ranks or for a core, later generations go first.
+struct RayPurpose {
+  RayKind kind = RayKind::Primary;
+  std::uint16_t generation = 0;  ///< bounces before, from the eye or a lamp
+};
+
 /// Rays side by side, one array per coordinate, in ray space. Directions have unit length.
 class RayBatch {
  public:
@@ -88,6 +109,7 @@ class RayBatch {
     Faces faces = Faces::Both;
   };
 
+  /// Leaves their purpose as it is.
   void clear() { size_ = 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
   void push(const glm::dvec3& origin, const glm::dvec3& direction, double reach, Faces faces = Faces::Both) {
@@ -122,6 +144,8 @@ class RayBatch {
     return ray;
   }
 
+  RayPurpose purpose;
+
  private:
   friend class RayScene;
   static constexpr std::size_t kWidth = 8;
@@ -150,6 +174,9 @@ class RayBatch {
 /// Whether rays that share a packet go the same way; a hint that makes Embree quicker where it is right and changes no
 /// result.
 enum class Coherence { Low, High };
+
+/// What a call keeps while it waits for rays that travel to other ranks: of large ones fewer are under way.
+enum class CallMemory { Small, Large };
 
 /// What a ray has met and passed, if it is sent once more from where it began: it then meets what comes next by
 /// distance, and by id where distances are equal. So nothing is skipped, however close surfaces lie.
@@ -208,10 +235,15 @@ class RayScene {
 
   /// Declares this one rank's part of a scene of which the other ranks hold the rest: from now on queries answer for
   /// all of it, and may be called inside for_each() only. Collective: ranks call it scene by scene in one order.
-  /// `forwarding` outlives this.
-  void share(RayForwarding& forwarding);
+  /// `forwarding` outlives this. Where ranks hold their parts in pages this has no surfaces; `surfaces` are those that
+  /// all pages together have of it.
+  void share(RayForwarding& forwarding, std::vector<SurfaceRange> surfaces = {}, const RayBuild& build = {});
+  /// Of one that is shared in pages: what it has of one of them, which is in use (PageInUse). Builds it by `threads`
+  /// threads where it is not there.
+  [[nodiscard]] const RayScene& of_page(std::size_t page, int threads) const;
   /// Calls body(i) for i in [0, count) by `threads` threads, as parallel_for; collective where the scene is shared.
-  void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body) const;
+  void for_each(int threads, std::size_t count, const std::function<void(std::size_t)>& body,
+                CallMemory memory = CallMemory::Large) const;
   /// Queries of this rank's part alone.
   [[nodiscard]] std::uint64_t occluded_local(const RayBatch& rays, std::span<std::uint8_t> blocked) const;
   [[nodiscard]] std::uint64_t closest_local(const RayBatch& rays, std::span<Passed> passed,
@@ -236,6 +268,12 @@ class RayScene {
   RaySpace space_;
   std::unique_ptr<Embree> embree_;
 };
+
+/// Of some surfaces, those that this rank's own ray scene is made of: all of them, those of its part, or none where
+/// that is in pages.
+[[nodiscard]] std::vector<SurfaceRange> surfaces_at_home(const Scene& scene,
+                                                         const std::optional<std::vector<SurfaceRange>>& part,
+                                                         const std::vector<SurfaceRange>& surfaces);
 
 /// True where Embree holds instance i of the scene as an instance of a shared mesh. Singular and strongly distorting
 /// placements are never shared: a ray carried into their coordinates would lose its digits.

@@ -7,7 +7,10 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <random>
+#include <span>
 #include <string>
+#include <tuple>
+#include <vector>
 
 #include "core/error.h"
 #include "rt/test_scene.h"
@@ -33,7 +36,7 @@ TEST(RayScene, FindsWhatABruteForceSearchFinds) {
   test::place_mesh(scene, shared, glm::scale(glm::translate(glm::dmat4(1.0), {0.0, 1.4, 0.2}), {0.5, 1.0, -0.7}));
   finish_scene(scene);
   ASSERT_EQ(shared_instances(scene), (std::vector<std::uint8_t>{0, 1, 1}));
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const RayScene rays(scene, space, 1);
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform(-2.0, 2.0);
@@ -78,7 +81,7 @@ Scene spheres() {
 /// Whether Embree's memory sufficed. Any other failure than that is a failure of the test.
 bool is_built_within(const Scene& scene, std::size_t max_bytes) {
   try {
-    const RayScene rays(scene, RaySpace(scene.bounds), 2, std::array{SurfaceRange{0, scene.triangles}},
+    const RayScene rays(scene, RaySpace(scene), 2, std::array{SurfaceRange{0, scene.triangles}},
                         {.max_bytes = max_bytes});
     return true;
   } catch (const Error& error) {
@@ -109,7 +112,7 @@ std::vector<std::uint32_t> met_with(const RayBuild& build) {
   const Mesh quad = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
   for (int copy = 0; copy < 3; ++copy) test::place_mesh(scene, test::add_mesh(scene, quad));
   finish_scene(scene);
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const RayScene rays(scene, space, 1, std::array{SurfaceRange{0, scene.triangles}}, build);
   std::mt19937 random(12);
   std::uniform_real_distribution<double> uniform(-2.0, 2.0);
@@ -136,6 +139,107 @@ TEST(RayScene, MeetsTheSameSurfacesWhateverTheQualityOfItsTrees) {
   EXPECT_TRUE(met_with({BuildQuality::High, true}) == expected);
 }
 
+/// Quads, level and upright as the walls of rooms, and tilted.
+Scene quads(std::mt19937& random) {
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  const auto random_point = [&] { return glm::vec3(uniform(random), uniform(random), uniform(random)); };
+  Scene scene;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int i = 0; i < 20; ++i) {
+      glm::vec3 a(0.0F);
+      glm::vec3 b(0.0F);
+      a[(axis + 1) % 3] = 0.3F + 0.2F * uniform(random);
+      b[(axis + 2) % 3] = 0.3F + 0.2F * uniform(random);
+      test::place_mesh(scene, test::add_mesh(scene, test::quad(random_point(), a, b, 0)));
+    }
+  }
+  for (int i = 0; i < 20; ++i) {
+    test::place_mesh(
+        scene, test::add_mesh(scene, test::quad(random_point(), 0.3F * random_point(), 0.3F * random_point(), 0)));
+  }
+  finish_scene(scene);
+  return scene;
+}
+
+TEST(RayScene, MeetsTheLowerOfTwoTrianglesAtTheirEdgeWhateverItsTreeAndItsParts) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const Scene scene = quads(random);
+  const RaySpace space(scene);
+  RayBatch batch;
+  for (int i = 0; i < 200000; ++i) {
+    const auto surface = static_cast<std::uint32_t>(i) % scene.triangles;
+    const Instance& instance = scene.instances[surface / 2];
+    // On the diagonal, which both triangles of a quad have.
+    const Mesh& mesh = scene.mesh_of(instance);
+    const glm::dvec3 a = space.from_world(glm::dvec3(mesh.positions[mesh.triangle(0).x]));
+    const glm::dvec3 b = space.from_world(glm::dvec3(mesh.positions[mesh.triangle(0).z]));
+    const glm::dvec3 goal = a + (0.5 + 0.49 * uniform(random)) * (b - a);
+    const glm::dvec3 origin(uniform(random), uniform(random), uniform(random));
+    batch.push(origin, glm::normalize(goal - origin), kInfinity);
+  }
+  const auto met = [&](std::span<const SurfaceRange> objects, BuildQuality quality) {
+    const RayScene rays(scene, space, 2, objects, {.quality = quality});
+    std::vector<Passed> passed(batch.size());
+    std::vector<std::uint32_t> surfaces(batch.size());
+    EXPECT_EQ(rays.closest(batch, passed, surfaces), 0U);
+    return passed;
+  };
+  const std::array all{SurfaceRange{0, scene.triangles}};
+  const std::vector<Passed> expected = met(all, BuildQuality::Medium);
+  const auto differing = [&](const std::vector<Passed>& found) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) count += found[i].surface != expected[i].surface ? 1U : 0U;
+    return count;
+  };
+  EXPECT_EQ(differing(met(all, BuildQuality::Low)), 0U);
+  EXPECT_EQ(differing(met(all, BuildQuality::High)), 0U);
+  // As two ranks that have every other triangle, the nearer one wins.
+  std::array<std::vector<SurfaceRange>, 2> halves;
+  for (std::uint32_t i = 0; i < scene.triangles; ++i) halves.at(i % 2).push_back({i, i + 1});
+  std::vector<Passed> merged = met(halves[0], BuildQuality::Medium);
+  const std::vector<Passed> other = met(halves[1], BuildQuality::Medium);
+  for (std::size_t i = 0; i < merged.size(); ++i) {
+    const bool is_other = merged[i].surface == kNoSurface ||
+                          (other[i].surface != kNoSurface && std::tie(other[i].distance, other[i].surface) <
+                                                                 std::tie(merged[i].distance, merged[i].surface));
+    if (is_other) merged[i] = other[i];
+  }
+  EXPECT_EQ(differing(merged), 0U);
+}
+
+TEST(RayScene, MeetsTheNearerOfTwoTrianglesThatAreAFewRoundingStepsApart) {
+  constexpr float kApart = 4.0F / (1U << 23U);
+  Scene scene;
+  constexpr int kPairs = 64;
+  for (int pair = 0; pair < kPairs; ++pair) {
+    // Every other pair has the nearer one, which lies higher, first.
+    const auto x = static_cast<float>(pair % 8) / 8.0F - 0.5F;
+    const auto y = static_cast<float>(pair / 8) / 8.0F - 0.5F;
+    for (const bool first : {true, false}) {
+      const float z = first == (pair % 2 == 0) ? kApart : 0.0F;
+      test::place_mesh(scene, test::add_mesh(scene, test::quad({x, y, z}, {0.1F, 0, 0}, {0, 0.1F, 0}, 0)));
+    }
+  }
+  finish_scene(scene);
+  const RaySpace space(scene.bounds);
+  RayBatch batch;
+  for (int pair = 0; pair < kPairs; ++pair) {
+    const glm::dvec3 above(pair % 8 / 8.0 - 0.47, pair / 8 / 8.0 - 0.44, 1.0);
+    batch.push(space.from_world(above), {0.0, 0.0, -1.0}, kInfinity);
+  }
+  for (const BuildQuality quality : {BuildQuality::Low, BuildQuality::Medium, BuildQuality::High}) {
+    const RayScene rays(scene, space, 1, std::array{SurfaceRange{0, scene.triangles}}, {.quality = quality});
+    std::vector<Passed> passed(batch.size());
+    std::vector<std::uint32_t> surfaces(batch.size());
+    EXPECT_EQ(rays.closest(batch, passed, surfaces), 0U);
+    for (int pair = 0; pair < kPairs; ++pair) {
+      const std::uint32_t mesh = passed[static_cast<std::size_t>(pair)].surface / 2;
+      EXPECT_EQ(mesh, static_cast<std::uint32_t>(2 * pair + pair % 2)) << pair;
+    }
+  }
+}
+
 TEST(RayScene, TheWidestInstructionsMayDisagreeAtEdgesAlone) {
   const auto expected = met_with({});
   const auto widest = met_with({BuildQuality::Medium, false});
@@ -149,7 +253,7 @@ TEST(RayScene, GivesTheLowestIdAmongSurfacesInOnePlane) {
   const Mesh quad = test::quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
   for (int copy = 0; copy < 5; ++copy) test::place_mesh(scene, test::add_mesh(scene, quad));
   finish_scene(scene);
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const RayScene rays(scene, space, 1);
   RayBatch batch;
   for (int i = 0; i < 100; ++i) batch.push({-0.9 + 0.0177 * i, 0.5, 3.0}, {0, 0, -1}, kInfinity);
@@ -160,7 +264,7 @@ TEST(RayScene, GivesTheLowestIdAmongSurfacesInOnePlane) {
 
 TEST(RayScene, SurvivesEveryKindOfImpossibleRayAndCountsThem) {
   const Scene scene = facing_quad();
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   const double nan = std::nan("");
   RayBatch batch;
   batch.push({0, 0, 1}, {0, 0, -1}, kInfinity);  // the only good one
@@ -184,7 +288,7 @@ TEST(RayScene, SurvivesEveryKindOfImpossibleRayAndCountsThem) {
 
 TEST(RayScene, ARayOfNoReachIsSoundAndMeetsNothing) {
   const Scene scene = facing_quad();
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   RayBatch batch;
   batch.push({0, 0, 1}, {0, 0, -1}, 0.0);  // what a light right on the surface gives
   std::vector<std::uint8_t> blocked(1);
@@ -194,7 +298,7 @@ TEST(RayScene, ARayOfNoReachIsSoundAndMeetsNothing) {
 
 TEST(RayScene, BlocksOnlyUpToTheRaysReach) {
   const Scene scene = facing_quad();
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   RayBatch batch;
   batch.push({0.1, 0.2, 1}, {0, 0, -1}, 0.999);
   batch.push({0.1, 0.2, 1}, {0, 0, -1}, 1.001);
@@ -214,7 +318,7 @@ TEST(RayScene, TakesSingularHugeAndEmptyPlacements) {
   test::place_mesh(scene, ball, glm::scale(glm::dmat4(1.0), {1e-7, 1.0, 1.0}));
   test::place_mesh(scene, empty);
   finish_scene(scene);
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const RayScene rays(scene, space, 1);
   EXPECT_EQ(rays.skipped_triangles(), 0U);
   RayBatch batch;

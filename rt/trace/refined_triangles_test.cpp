@@ -39,7 +39,7 @@ Scene ground(double half_size, const glm::dmat4& turned) {
 }
 
 std::vector<std::uint8_t> refined(const Scene& scene) {
-  return refined_instances(scene, RaySpace(scene.bounds));
+  return refined_instances(scene, RaySpace(scene));
 }
 
 TEST(RefinedTriangles, AreThoseOfWideGrounds) {
@@ -76,7 +76,7 @@ TEST(RefinedTriangles, AreThoseOfSharedMeshesToo) {
   test::place_mesh(scene, mesh, glm::translate(glm::dmat4(1.0), {2.0, 1.0, 0.0}));
   finish_scene(scene);
   EXPECT_EQ(refined(scene), (std::vector<std::uint8_t>{1, 0, 0}));
-  const RayScene rays(scene, RaySpace(scene.bounds), 1);
+  const RayScene rays(scene, RaySpace(scene), 1);
   EXPECT_NE(rays.geometries()[0].triangles, nullptr);
   EXPECT_EQ(rays.geometries()[1].triangles, nullptr);
 }
@@ -93,7 +93,7 @@ TEST(RefinedTriangles, AreOfSoManyInstancesThatTheirPartsFitIntoMemory) {
   const std::vector<std::uint8_t> are_refined = refined(scene);
   for (std::size_t i = 0; i < are_refined.size(); ++i) {
     if (are_refined[i] == 0) continue;
-    parts += refine(scene, scene.instances[i], {0, 2}, RaySpace(scene.bounds)).parts.size();
+    parts += refine(scene, scene.instances[i], {0, 2}, RaySpace(scene)).parts.size();
   }
   EXPECT_GT(parts, 100000U);
   EXPECT_LE(parts, std::size_t{1} << 18);
@@ -101,7 +101,7 @@ TEST(RefinedTriangles, AreOfSoManyInstancesThatTheirPartsFitIntoMemory) {
 
 TEST(RefinedTriangles, AreShorterThanTheirDistanceAndClosed) {
   const Scene scene = ground(1e6, tilted());
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const RefinedTriangles all = refine(scene, scene.instances[0], {0, 2}, space);
   ASSERT_EQ(all.parts.size(), all.triangle_of.size());
   EXPECT_LT(all.parts.size(), 8000U);
@@ -140,7 +140,7 @@ glm::dvec3 location(Sampler& sampler, double half_size) {
 TEST(RefinedTriangles, AreMetFromAboveAndLeftByRays) {
   constexpr double kHalfSize = 1e6;
   const Scene scene = ground(kHalfSize, tilted());
-  const RaySpace space(scene.bounds);
+  const RaySpace space(scene);
   const RayScene rays(scene, space, 1);
   const Surfaces surfaces(scene, space);
   RayBatch down;

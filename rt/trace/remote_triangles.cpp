@@ -81,16 +81,16 @@ void RemoteTriangles::keep(Shard& shard, std::uint32_t surface, std::shared_ptr<
 }
 
 SurfaceOwners::SurfaceOwners(std::span<const std::vector<SurfaceRange>> parts) {
-  for (std::size_t rank = 0; rank < parts.size(); ++rank) {
-    for (const SurfaceRange& range : parts[rank]) ranges_.push_back({range.first, range.last, static_cast<int>(rank)});
+  for (std::size_t holder = 0; holder < parts.size(); ++holder) {
+    for (const SurfaceRange& range : parts[holder]) ranges_.push_back({range.first, range.last, holder});
   }
   std::ranges::sort(ranges_, {}, &Range::first);
 }
 
-int SurfaceOwners::rank_of(std::uint32_t surface) const {
+std::size_t SurfaceOwners::holder_of(std::uint32_t surface) const {
   const auto range = std::ranges::upper_bound(ranges_, surface, {}, &Range::last);
   HPR_CHECK(range != ranges_.end() && range->first <= surface);
-  return range->rank;
+  return range->holder;
 }
 
 }  // namespace hpr

@@ -54,22 +54,22 @@ class RemoteTriangles {
   std::size_t per_shard_ = 256;
 };
 
-/// Which rank holds a surface that not all hold.
+/// Who holds a surface that not all hold: a rank, or a page of one.
 class SurfaceOwners {
  public:
   SurfaceOwners() = default;
-  /// Of each rank what it holds, ranges that share no surface.
+  /// Of each holder what it has, ranges that share no surface.
   explicit SurfaceOwners(std::span<const std::vector<SurfaceRange>> parts);
 
   [[nodiscard]] bool is_empty() const { return ranges_.empty(); }
-  /// The surface must be of some rank's part.
-  [[nodiscard]] int rank_of(std::uint32_t surface) const;
+  /// The number of its holder; there must be one.
+  [[nodiscard]] std::size_t holder_of(std::uint32_t surface) const;
 
  private:
   struct Range {
     std::uint32_t first = 0;
     std::uint32_t last = 0;
-    int rank = 0;
+    std::size_t holder = 0;
   };
   std::vector<Range> ranges_;  ///< ascending
 };

@@ -65,8 +65,7 @@ Scene shared_out(Communicator& comm, const Scene& whole) {
     return loaded;
   });
   if (comm.size() == 1) return scene;
-  const auto mine =
-      count_refined_parts(scene, RaySpace(scene.bounds), scene.parts[static_cast<std::size_t>(comm.rank())]);
+  const auto mine = count_refined_parts(scene, RaySpace(scene), scene.parts[static_cast<std::size_t>(comm.rank())]);
   std::vector<RefinementCount> counts;
   for (const auto& of_rank : all_gather_lists(comm, std::span(mine))) {
     counts.insert(counts.end(), of_rank.begin(), of_rank.end());
@@ -121,7 +120,7 @@ TEST(RemoteTriangles, SurfacesAreMetAsInAWholeScene) {
           const glm::dvec3 origin = aim + glm::dvec3(0.3, 2.0, 0.4);
           const SurfacePoint met = surfaces.meet(here, origin, aim - origin);
           expect_same(met, expected.meet(there, origin, aim - origin), id);
-          EXPECT_EQ(surfaces.coplanar_tolerance(here, met), expected.coplanar_tolerance(there, met));
+          EXPECT_EQ(surfaces.coplanar_tolerance(here, met.offset), expected.coplanar_tolerance(there, met.offset));
         }
         EXPECT_GT(remote, 0U);
       });
@@ -144,12 +143,12 @@ TEST(RemoteTriangles, OldOnesMakeRoom) {
 TEST(RemoteTriangles, EverySurfaceHasAnOwner) {
   const std::array<std::vector<SurfaceRange>, 3> parts{{{{0, 5}, {20, 30}}, {{5, 20}}, {{30, 31}}}};
   const SurfaceOwners owners(parts);
-  EXPECT_EQ(owners.rank_of(0), 0);
-  EXPECT_EQ(owners.rank_of(4), 0);
-  EXPECT_EQ(owners.rank_of(5), 1);
-  EXPECT_EQ(owners.rank_of(19), 1);
-  EXPECT_EQ(owners.rank_of(29), 0);
-  EXPECT_EQ(owners.rank_of(30), 2);
+  EXPECT_EQ(owners.holder_of(0), 0U);
+  EXPECT_EQ(owners.holder_of(4), 0U);
+  EXPECT_EQ(owners.holder_of(5), 1U);
+  EXPECT_EQ(owners.holder_of(19), 1U);
+  EXPECT_EQ(owners.holder_of(29), 0U);
+  EXPECT_EQ(owners.holder_of(30), 2U);
 }
 
 }  // namespace

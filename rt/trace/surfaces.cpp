@@ -214,7 +214,7 @@ double Surfaces::offset_of(const WorldTriangle& triangle) const {
   return std::max(kStep * (along < most ? along : most), kMinOffset / space_.scale);
 }
 
-double Surfaces::coplanar_tolerance(const WorldTriangle& triangle, const SurfacePoint& point) const {
+double Surfaces::coplanar_tolerance(const WorldTriangle& triangle, double offset) const {
   const Instance& instance = scene_.instances[triangle.instance];
   const Mesh& mesh = mesh_of(triangle);
   const glm::uvec3& corners = corners_of(mesh, triangle);
@@ -223,11 +223,11 @@ double Surfaces::coplanar_tolerance(const WorldTriangle& triangle, const Surface
     farthest = glm::max(farthest, glm::abs(glm::dvec3(mesh.positions[corners[corner]])));
   }
   const glm::dvec3 stored = magnitudes(glm::dmat3(instance.to_world)) * farthest;
-  return point.offset + kOriginSteps * kFloatStep * glm::dot(glm::abs(triangle.normal), stored);
+  return offset + kOriginSteps * kFloatStep * glm::dot(glm::abs(triangle.normal), stored);
 }
 
-void Surfaces::prefetch(std::span<const std::uint32_t> ids) const {
-  if (others_ != nullptr) others_->fetch_triangles(ids);
+void Surfaces::prefetch(std::span<const std::uint32_t> ids, std::uint16_t generation) const {
+  if (others_ != nullptr) others_->fetch_triangles(ids, generation);
   constexpr std::size_t kAhead = 64;
   std::array<const Mesh*, kAhead> meshes;
   std::array<const glm::uvec3*, kAhead> corners;
@@ -279,29 +279,49 @@ const TextureRef& map_of_tangents(const Material& material) {
 
 }  // namespace
 
-SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,
-                            const glm::dvec3& direction) const {
+Surfaces::PlanePoint Surfaces::plane_point(const WorldTriangle& triangle, const glm::dvec3& origin,
+                                           const glm::dvec3& direction) const {
   // Moeller and Trumbore 1997, relative to the ray's origin.
   const glm::dvec3 from_v0 = origin - triangle.v0;
   const glm::dvec3 p = glm::cross(direction, triangle.e2);
   const glm::dvec3 q = glm::cross(from_v0, triangle.e1);
   const double determinant = glm::dot(triangle.e1, p);
   const glm::dvec2 met(glm::dot(from_v0, p) / determinant, glm::dot(direction, q) / determinant);
-  const glm::dvec2 on = onto_triangle(met.x, met.y);
-  // Where the ray meets the plane beside a refined triangle, textures and the place go on; all else stays the edge's.
-  const glm::dvec2 at =
-      placed_[triangle.instance].is_refined
-          ? onto_refined(space_, met,
-                         {triangle.v0 - space_.origin, triangle.e1, triangle.e2, origin - space_.origin, direction})
-          : on;
+  const bool is_refined = placed_[triangle.instance].is_refined;
+
+  PlanePoint hit;
+  hit.on_triangle = onto_triangle(met.x, met.y);
+  hit.at = is_refined ? onto_refined(
+                            space_, met,
+                            {triangle.v0 - space_.origin, triangle.e1, triangle.e2, origin - space_.origin, direction})
+                      : hit.on_triangle;
+  hit.position = triangle.v0 + hit.at.x * triangle.e1 + hit.at.y * triangle.e2;
+  hit.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
+  hit.against_winding = glm::dot(triangle.normal, hit.to_viewer) < 0.0;
+  hit.offset = std::max(triangle.offset, space_.rounding_at(hit.position));
+  if (is_refined) hit.offset = std::min(hit.offset, refined_offset(space_, hit.position));
+  return hit;
+}
+
+SurfacePlane Surfaces::plane(const WorldTriangle& triangle, const glm::dvec3& origin,
+                             const glm::dvec3& direction) const {
+  const PlanePoint hit = plane_point(triangle, origin, direction);
+  return {hit.position, hit.against_winding ? -triangle.normal : triangle.normal,
+          coplanar_tolerance(triangle, hit.offset)};
+}
+
+SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& origin,
+                            const glm::dvec3& direction) const {
+  const PlanePoint hit = plane_point(triangle, origin, direction);
+  const glm::dvec2& on = hit.on_triangle;
+  const glm::dvec2& at = hit.at;
   const double b0 = 1.0 - at.x - at.y;
 
   SurfacePoint point;
-  point.position = triangle.v0 + at.x * triangle.e1 + at.y * triangle.e2;
-  point.to_viewer = unit(-direction, glm::dvec3(0.0, 0.0, 1.0));
-  const bool against_winding = glm::dot(triangle.normal, point.to_viewer) < 0.0;
-  point.geometric_normal = against_winding ? -triangle.normal : triangle.normal;
-  point.inside = against_winding != placed_[triangle.instance].swaps_handedness;
+  point.position = hit.position;
+  point.to_viewer = hit.to_viewer;
+  point.geometric_normal = hit.against_winding ? -triangle.normal : triangle.normal;
+  point.inside = hit.against_winding != placed_[triangle.instance].swaps_handedness;
   const auto& corner = triangle.normals;
   const Weights weight{1.0 - on.x - on.y, on.x, on.y};
   const glm::dvec3 smooth = unit(weight[0] * corner[0] + on.x * corner[1] + on.y * corner[2], triangle.normal);
@@ -309,9 +329,7 @@ SurfacePoint Surfaces::meet(const WorldTriangle& triangle, const glm::dvec3& ori
   point.shading_normal = side * smooth;
 
   if (lifts_) lift(triangle, weight, side, point);
-  point.offset = std::max(triangle.offset, space_.rounding_at(point.position));
-  if (placed_[triangle.instance].is_refined)
-    point.offset = std::min(point.offset, refined_offset(space_, point.position));
+  point.offset = hit.offset;
 
   const Mesh& mesh = mesh_of(triangle);
   const glm::uvec3& corners = corners_of(mesh, triangle);

@@ -67,6 +67,14 @@ struct SurfacePoint {
   }
 };
 
+/// Where a ray meets a surface, as far as it matters for which of two lies before the other. Those of one plane are
+/// told apart by what they are: the order of a decal and what it is on is no matter of rounding.
+struct SurfacePlane {
+  glm::dvec3 position{0.0};
+  glm::dvec3 normal{0.0};  ///< unit length, on the viewer's side; zero: none
+  double tolerance = 0.0;  ///< metres, see Surfaces::coplanar_tolerance
+};
+
 /// Where rays leave a surface towards `direction`: off it, on that side.
 [[nodiscard]] inline glm::dvec3 ray_origin(const SurfacePoint& point, const glm::dvec3& direction) {
   const double side = glm::dot(direction, point.geometric_normal) < 0.0 ? -1.0 : 1.0;
@@ -88,17 +96,21 @@ class Surfaces {
   [[nodiscard]] bool are_shared_out() const { return others_ != nullptr; }
 
   /// Asks the memory for the triangles of `ids`, kNoSurface left out, which will be loaded next: they lie far apart.
-  /// Waits for those that other ranks hold, all together.
-  void prefetch(std::span<const std::uint32_t> ids) const;
+  /// Waits for those that other ranks hold, all together. `generation`: of the rays that met them.
+  void prefetch(std::span<const std::uint32_t> ids, std::uint16_t generation = 0) const;
 
   /// The point where the ray meets the triangle's plane, moved onto the triangle when it lies outside (a pixel's centre
   /// may miss a triangle it was given by a hair). Exact to double rounding: nothing is read from depths.
   [[nodiscard]] SurfacePoint meet(const WorldTriangle& triangle, const glm::dvec3& origin,
                                   const glm::dvec3& direction) const;
 
+  /// The plane there, which costs less than all that meet() finds.
+  [[nodiscard]] SurfacePlane plane(const WorldTriangle& triangle, const glm::dvec3& origin,
+                                   const glm::dvec3& direction) const;
+
   /// Metres by which two surfaces that a file puts in one plane may lie apart where they meet, for each of them: what
   /// the rounding of the mesh's own coordinates comes to along the normal, and what SurfacePoint::offset is for.
-  [[nodiscard]] double coplanar_tolerance(const WorldTriangle& triangle, const SurfacePoint& point) const;
+  [[nodiscard]] double coplanar_tolerance(const WorldTriangle& triangle, double offset) const;
 
  private:
   /// Barycentric coordinates of a triangle's corners.
@@ -111,6 +123,17 @@ class Surfaces {
   [[nodiscard]] static const glm::uvec3& corners_of(const Mesh& mesh, const WorldTriangle& triangle) {
     return mesh.triangle(triangle.remote ? 0 : triangle.index);
   }
+  /// Where a ray meets a triangle's plane.
+  struct PlanePoint {
+    glm::dvec2 on_triangle{0.0};  ///< barycentric, moved onto the triangle
+    glm::dvec2 at{0.0};           ///< the same, but for refined triangles, which textures and the place go on beside
+    glm::dvec3 position{0.0};
+    glm::dvec3 to_viewer{0.0};
+    bool against_winding = false;  ///< the viewer is there
+    double offset = 0.0;           ///< see SurfacePoint::offset
+  };
+  [[nodiscard]] PlanePoint plane_point(const WorldTriangle& triangle, const glm::dvec3& origin,
+                                       const glm::dvec3& direction) const;
   [[nodiscard]] std::uint8_t layer_of(const WorldTriangle& triangle, bool inside) const;
   [[nodiscard]] double offset_of(const WorldTriangle& triangle) const;
   static void lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point);

@@ -24,7 +24,7 @@ Scene one_triangle(const glm::dmat4& to_world = glm::dmat4(1.0)) {
 }
 
 SurfacePoint meet(const Scene& scene, std::uint32_t id, const glm::dvec3& origin, const glm::dvec3& direction) {
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   WorldTriangle triangle;
   surfaces.load(id, triangle);
   return surfaces.meet(triangle, origin, direction);
@@ -160,6 +160,23 @@ TEST(Surfaces, KnowWhichSideOfAFaceTheViewerIsOn) {
   }
 }
 
+TEST(Surfaces, HaveThePlaneOfWhereARayMeetsThem) {
+  const Scene scene = one_triangle(glm::rotate(glm::dmat4(1.0), 0.7, glm::dvec3(1.0, 2.0, 3.0)));
+  const Surfaces surfaces(scene, RaySpace(scene));
+  WorldTriangle triangle;
+  surfaces.load(0, triangle);
+  for (const double side : {-3.0, 3.0}) {
+    const glm::dvec3 inside = triangle.v0 + 0.25 * triangle.e1 + 0.25 * triangle.e2;
+    const glm::dvec3 origin = inside + side * triangle.normal;
+    const SurfacePlane plane = surfaces.plane(triangle, origin, inside - origin);
+    const SurfacePoint point = surfaces.meet(triangle, origin, inside - origin);
+    EXPECT_EQ(plane.position, point.position);
+    EXPECT_EQ(plane.normal, point.geometric_normal);
+    EXPECT_EQ(plane.tolerance, surfaces.coplanar_tolerance(triangle, point.offset));
+    EXPECT_GT(plane.tolerance, point.offset);
+  }
+}
+
 TEST(Surfaces, InterpolateVertexColorsAndTellTheirNumber) {
   Scene scene = one_triangle();
   EXPECT_EQ(meet(scene, 0, {0.5, 1.0, 3.0}, {0.0, 0.0, -2.0}).color, glm::dvec4(1.0));
@@ -180,7 +197,7 @@ TEST(Surfaces, FindTheInstanceOfAnyIdInAnyOrder) {
     test::place_mesh(scene, empty);
   }
   finish_scene(scene);
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   WorldTriangle triangle;
   for (const std::uint32_t id : {7U, 0U, 1U, 6U, 2U, 3U, 5U, 4U, 4U}) {
     surfaces.load(id, triangle);

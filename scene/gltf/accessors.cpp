@@ -6,15 +6,35 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <string>
 #include <type_traits>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "scene/gltf/uri.h"
 
 namespace hpr {
 void GltfBuffers::forget() const {
   if (file_ != nullptr) file_->forget();
   for (const FileBytes& file : owned_) file.forget();
+}
+
+std::optional<FileLocation> GltfBuffers::location_of(std::span<const std::byte> bytes) const {
+  const auto within = [&](std::span<const std::byte> file, const std::filesystem::path& path) {
+    std::optional<FileLocation> location;
+    const auto at = static_cast<std::uint64_t>(bytes.data() - file.data());
+    if (!path.empty() && bytes.data() >= file.data() && at + bytes.size() <= file.size()) {
+      location = {path, file.size(), at};
+    }
+    return location;
+  };
+  if (file_ != nullptr) {
+    if (auto location = within(file_->bytes(), document_)) return location;
+  }
+  for (std::size_t i = 0; i < paths_.size(); ++i) {
+    if (auto location = within(owned_[i].bytes(), paths_[i])) return location;
+  }
+  return std::nullopt;
 }
 
 FileBytes GltfBuffers::resolve(const std::string& uri, const std::string& where, GltfContext& context) const {
@@ -64,6 +84,10 @@ void GltfBuffers::load(const Json& root, GltfContext& context) {
   if (found == nullptr) return;
   const std::vector<bool> read = buffers_read(root, found->size());
   owned_.resize(found->size());
+  if (context.reads_in_parts()) {
+    document_ = context.name();
+    paths_.resize(found->size());
+  }
   bytes_.resize(found->size());
   for (std::size_t i = 0; i < found->size(); ++i) {
     if (!read[i] && meshopt_of((*found)[i]).value("fallback", false)) continue;
@@ -83,6 +107,7 @@ std::span<const std::byte> GltfBuffers::load_buffer(const Json& buffer, std::siz
     const auto uri = buffer["uri"].get<std::string>();
     if (is_picture_uri(uri)) context.warn(where, "its data URI says that it is a picture");
     owned_[index] = resolve(uri, where, context);
+    if (context.reads_in_parts() && !is_data_uri(uri)) paths_[index] = folder_ / jailed_path(uri, where);
     bytes = owned_[index].bytes();
   } else if (index == 0 && parts_->has_binary) {
     bytes = parts_->binary;
@@ -216,6 +241,55 @@ bool is_unsigned(int component_type) {
 
 }  // namespace
 
+tinygltf::Model parse_model(Json root, const GltfContext& context) {
+  root.erase("buffers");
+  root.erase("images");
+  root.erase("animations");
+  // tinygltf refuses indices without a bufferView (zeros, or sparse ones); it does not get to see any.
+  std::vector<int> indices;
+  if (Json* const meshes = root.find("meshes")) {
+    for (Json& mesh : meshes->elements()) {
+      for (Json& primitive : mesh["primitives"].elements()) {
+        indices.push_back(primitive.contains("indices") ? primitive["indices"].get<int>() : -1);
+        primitive.erase("indices");
+      }
+    }
+  }
+  const std::string text = root.dump();
+  if (text.size() > std::numeric_limits<unsigned int>::max()) {
+    context.fail("", "the JSON has more than 4 GiB", "split the scene", ExitCode::Limit);
+  }
+  tinygltf::Model model;
+  std::string errors;
+  std::string warnings;
+  if (!tinygltf::TinyGLTF().LoadASCIIFromString(&model, &errors, &warnings, text.data(),
+                                                static_cast<unsigned int>(text.size()), "")) {
+    context.fail("", printable(errors.substr(0, errors.find('\n')), 200));
+  }
+  std::size_t next = 0;
+  for (tinygltf::Mesh& mesh : model.meshes) {
+    for (tinygltf::Primitive& primitive : mesh.primitives) {
+      if (next < indices.size()) primitive.indices = indices[next];
+      ++next;
+    }
+  }
+  if (next != indices.size()) context.fail("meshes", "some primitives cannot be read");
+  return model;
+}
+
+void GltfElements::read(std::size_t first, std::size_t count, float* out) const {
+  const std::byte* const from = data + first * stride;
+  if (count == 1 && component_type == TINYGLTF_COMPONENT_TYPE_FLOAT) {
+    std::memcpy(out, from, width * sizeof(float));
+  } else {
+    to_floats(component_type, normalized, from, stride, count, width, out);
+  }
+}
+
+void GltfElements::read(std::size_t first, std::size_t count, std::uint32_t* out) const {
+  to_integers(component_type, data + first * stride, stride, count, width, out);
+}
+
 GltfData::GltfData(const tinygltf::Model& model, const GltfBuffers& buffers, GltfContext& context)
     : model_(&model), buffers_(&buffers), context_(&context) {
   for (std::size_t i = 0; i < model.bufferViews.size(); ++i) {
@@ -339,6 +413,18 @@ void GltfData::read_floats(int index, float* out, std::size_t width) const {
     to_floats(from.componentType, from.normalized, value, size, 1, width, out + target * width);
     value += size;
   }
+}
+
+GltfElements GltfData::elements(int index) const {
+  HPR_CHECK(context_->is_used("accessors", to_size(index)));
+  const tinygltf::Accessor& from = accessor(index);
+  HPR_CHECK(from.bufferView >= 0 && !from.sparse.isSparse);
+  const Shape shape = shape_of(from.type);
+  HPR_CHECK(shape.columns == 1);
+  const std::size_t stride = model_->bufferViews[to_size(from.bufferView)].byteStride;
+  return {view(from.bufferView).data() + from.byteOffset,
+          stride == 0 ? element_bytes(from.type, from.componentType) : stride, shape.rows, from.componentType,
+          from.normalized};
 }
 
 void GltfData::forget_after(std::size_t bytes) const {

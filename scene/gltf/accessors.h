@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,6 +41,13 @@ decltype(auto) visit_component(int component_type, const Visit& visit) {
   }
 }
 
+/// Bytes of a file.
+struct FileLocation {
+  std::filesystem::path file;
+  std::uint64_t file_bytes = 0;
+  std::uint64_t offset = 0;
+};
+
 /// The bytes behind a document's buffers and pictures. Reads files only below the scene's folder.
 class GltfBuffers {
  public:
@@ -61,6 +69,9 @@ class GltfBuffers {
   [[nodiscard]] std::span<const std::byte> range(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
                                                  const std::string& where, const GltfContext& context) const;
 
+  /// Where bytes of a buffer lie in a file that stays where it is; none of those that are in memory.
+  [[nodiscard]] std::optional<FileLocation> location_of(std::span<const std::byte> bytes) const;
+
   /// Gives back the memory of files that were looked at and stay where they are.
   void forget() const;
 
@@ -73,8 +84,27 @@ class GltfBuffers {
   std::filesystem::path folder_;
   const GltfParts* parts_;
   const FileBytes* file_;
+  std::filesystem::path document_;  ///< the file that parts_ point into, where it stays; else empty
   std::vector<FileBytes> owned_;
+  std::vector<std::filesystem::path> paths_;  ///< of those that stay where they are; else empty
   std::vector<std::span<const std::byte>> bytes_;
+};
+
+/// tinygltf's model of the document, without its buffers and pictures: those are read by us alone, so that the library
+/// never opens a file or decodes anything. Nor does it get animations, which are not played.
+[[nodiscard]] tinygltf::Model parse_model(Json root, const GltfContext& context);
+
+/// The elements of an accessor that has all its values in one place.
+struct GltfElements {
+  const std::byte* data = nullptr;  ///< of the first one
+  std::size_t stride = 0;           ///< bytes from one to the next
+  std::size_t width = 0;            ///< components
+  int component_type = 0;
+  bool normalized = false;
+
+  /// Elements from `first` on as vec2s() and its like give them, or as integers() does.
+  void read(std::size_t first, std::size_t count, float* out) const;
+  void read(std::size_t first, std::size_t count, std::uint32_t* out) const;
 };
 
 /// A glTF model together with its bytes: accessors as plain arrays. Indices into sections were checked before
@@ -105,6 +135,9 @@ class GltfData {
   [[nodiscard]] std::vector<glm::mat4> mat4s(int index) const { return read<glm::mat4>(index); }
   /// Unsigned integers (1, 2 or 4 bytes), `width` of them per element: vertex indices, joints.
   [[nodiscard]] std::vector<std::uint32_t> integers(int index) const;
+
+  /// To read some of an accessor that has a view and is not sparse; of scalars and vectors.
+  [[nodiscard]] GltfElements elements(int index) const;
 
   static std::size_t to_size(int index) { return static_cast<std::size_t>(index); }
 

@@ -15,9 +15,9 @@ namespace hpr {
 /// chosen scene does not use. Points and lines have no shapes yet, see shape_points_and_lines. Throws Error (Io,
 /// BadInput, Limit; Usage for a scene or variant that the file lacks).
 ///
-/// `in_parts`: files stay where they are, and one mesh at a time is read; those that not all ranks hold
-/// (is_held_by_all) come without triangles, see LoadedScene::whole_mesh. What is compressed (Draco, meshopt) is decoded
-/// whole.
+/// `in_parts`: files stay where they are, and one mesh at a time is read, a large one in pieces
+/// (read_primitive_in_pieces); those that not all ranks hold (is_held_by_all) come without triangles, see
+/// LoadedScene::read_mesh. What is compressed (Draco, meshopt) is decoded whole.
 [[nodiscard]] LoadedScene load_gltf(const std::filesystem::path& path, const SceneLimits& limits,
                                     const SceneChoice& choice = {}, bool in_parts = false);
 

@@ -22,6 +22,7 @@
 #include "scene/gltf/gltf.h"
 #include "scene/gltf/materials.h"
 #include "scene/gltf/mesh.h"
+#include "scene/gltf/pieces/primitive_reader.h"
 #include "scene/gltf/scan.h"
 #include "scene/gltf/selection.h"
 #include "scene/gltf/uri.h"
@@ -264,44 +265,6 @@ std::vector<glm::dmat4> gpu_instances(const GltfData& data, int node) {
   return placed;
 }
 
-/// tinygltf's model of the document, without its buffers and pictures: those are read by us alone, so that the library
-/// never opens a file or decodes anything. Nor does it get animations, which are not played.
-tinygltf::Model parse_model(Json root, const GltfContext& context) {
-  root.erase("buffers");
-  root.erase("images");
-  root.erase("animations");
-  // tinygltf refuses indices without a bufferView (zeros, or sparse ones); it does not get to see any.
-  std::vector<int> indices;
-  if (Json* const meshes = root.find("meshes")) {
-    for (Json& mesh : meshes->elements()) {
-      for (Json& primitive : mesh["primitives"].elements()) {
-        indices.push_back(primitive.contains("indices") ? primitive["indices"].get<int>() : -1);
-        primitive.erase("indices");
-      }
-    }
-  }
-  const std::string text = root.dump();
-  if (text.size() > std::numeric_limits<unsigned int>::max()) {
-    context.fail("", "the JSON has more than 4 GiB", "split the scene", ExitCode::Limit);
-  }
-  tinygltf::Model model;
-  std::string errors;
-  std::string warnings;
-  if (!tinygltf::TinyGLTF().LoadASCIIFromString(&model, &errors, &warnings, text.data(),
-                                                static_cast<unsigned int>(text.size()), "")) {
-    context.fail("", printable(errors.substr(0, errors.find('\n')), 200));
-  }
-  std::size_t next = 0;
-  for (tinygltf::Mesh& mesh : model.meshes) {
-    for (tinygltf::Primitive& primitive : mesh.primitives) {
-      if (next < indices.size()) primitive.indices = indices[next];
-      ++next;
-    }
-  }
-  if (next != indices.size()) context.fail("meshes", "some primitives cannot be read");
-  return model;
-}
-
 /// The largest coordinate a mesh reaches in the world, or infinity.
 double max_coordinate(const glm::dmat4& to_world, const glm::dvec3& max_abs) {
   double most = 0.0;
@@ -340,9 +303,13 @@ class SceneBuilder {
   }
 
   /// A mesh of the scene once more, as it was before its triangles were left out; but for its name and material.
-  [[nodiscard]] Mesh whole_mesh(std::uint32_t index) const {
+  [[nodiscard]] std::unique_ptr<MeshReader> read_mesh(std::uint32_t index) const {
     const Source& source = sources_.at(index);
-    return build(data_.model().nodes[GltfData::to_size(source.node)], source.primitive).value_or(Mesh());
+    const tinygltf::Node& node = data_.model().nodes[GltfData::to_size(source.node)];
+    if (source.in_pieces) {
+      if (auto reader = pieces_of(node, source.primitive)) return reader;  // else the file changed
+    }
+    return std::make_unique<WholeMeshReader>(build(node, source.primitive).value_or(Mesh()));
   }
 
  private:
@@ -350,6 +317,7 @@ class SceneBuilder {
   struct Source {
     int node = 0;
     std::size_t primitive = 0;
+    bool in_pieces = false;
   };
 
   /// Which meshes come of a glTF mesh in one pose: (mesh, skin, weights).
@@ -405,9 +373,29 @@ class SceneBuilder {
 
   /// Builds a primitive of a node's mesh, in its pose.
   [[nodiscard]] std::optional<Mesh> build(const tinygltf::Node& node, std::size_t primitive) const {
-    const tinygltf::Mesh& from = data_.model().meshes[GltfData::to_size(node.mesh)];
-    const GltfPose pose{node.weights.empty() ? from.weights : node.weights, joints_of(node.skin)};
-    return build_primitive(data_, from.primitives[primitive], primitive_path(node, primitive), pose, default_material_);
+    return build_primitive(data_, primitive_of(node, primitive), primitive_path(node, primitive), pose_of(node),
+                           default_material_);
+  }
+
+  /// Reads one in pieces, where that is possible.
+  [[nodiscard]] std::unique_ptr<MeshReader> pieces_of(const tinygltf::Node& node, std::size_t primitive) const {
+    if (!context().reads_in_parts()) return nullptr;
+    const tinygltf::Primitive& from = primitive_of(node, primitive);
+    Mesh mesh;
+    mesh.material = from.material >= 0 ? static_cast<std::uint32_t>(from.material) : default_material_;
+    if (is_held_by_all(scene_, mesh)) return nullptr;
+    auto reader = read_primitive_in_pieces(data_, from, pose_of(node));
+    if (reader) reader->material = mesh.material;
+    return reader;
+  }
+
+  [[nodiscard]] const tinygltf::Primitive& primitive_of(const tinygltf::Node& node, std::size_t primitive) const {
+    return data_.model().meshes[GltfData::to_size(node.mesh)].primitives[primitive];
+  }
+
+  [[nodiscard]] GltfPose pose_of(const tinygltf::Node& node) const {
+    const tinygltf::Mesh& mesh = data_.model().meshes[GltfData::to_size(node.mesh)];
+    return {node.weights.empty() ? mesh.weights : node.weights, joints_of(node.skin)};
   }
 
   static std::string primitive_path(const tinygltf::Node& node, std::size_t primitive) {
@@ -424,20 +412,39 @@ class SceneBuilder {
     check_weights(node, from);
     std::vector<std::uint32_t> made;
     for (std::size_t p = 0; p < from.primitives.size(); ++p) {
-      const std::uint64_t charged = context().charged();
-      auto mesh = build(node, p);
-      if (!mesh) continue;
-      check_texture_coordinates(*mesh, primitive_path(node, p));
-      mesh->name = from.primitives.size() > 1 ? fmt::format("{}.{}", from.name, p) : from.name;
-      made.push_back(static_cast<std::uint32_t>(scene_.meshes.size()));
-      max_abs_.push_back(max_abs_coordinates(*mesh));
-      if (mesh->kind != MeshKind::Triangles && !from.primitives[p].attributes.contains("NORMAL")) {
-        unlit_.push_back(made.back());
+      const std::string name = from.primitives.size() > 1 ? fmt::format("{}.{}", from.name, p) : from.name;
+      const auto number = static_cast<std::uint32_t>(scene_.meshes.size());
+      const auto reader = pieces_of(node, p);
+      if (reader) {
+        reader->name = name;
+        check_texture_coordinates(reader->material, {reader->has(VertexArray::Uvs0), reader->has(VertexArray::Uvs1)},
+                                  primitive_path(node, p));
+        scene_.meshes.push_back(without_triangles(*reader));
+        max_abs_.push_back(scene_.meshes.back().partial->reach);
+        data_.forget();
+      } else if (!add_whole(node, p, name)) {
+        continue;
       }
-      keep(*std::move(mesh), charged);
-      sources_.push_back({index, p});
+      made.push_back(number);
+      sources_.push_back({index, p, reader != nullptr});
     }
     return meshes_.emplace(std::move(key), std::move(made)).first->second;
+  }
+
+  /// Reads a primitive whole, and adds it to the scene if it is a mesh.
+  bool add_whole(const tinygltf::Node& node, std::size_t primitive, const std::string& name) {
+    const std::uint64_t charged = context().charged();
+    auto mesh = build(node, primitive);
+    if (!mesh) return false;
+    check_texture_coordinates(mesh->material, {!mesh->uvs[0].empty(), !mesh->uvs[1].empty()},
+                              primitive_path(node, primitive));
+    mesh->name = name;
+    max_abs_.push_back(max_abs_coordinates(*mesh));
+    if (mesh->kind != MeshKind::Triangles && !primitive_of(node, primitive).attributes.contains("NORMAL")) {
+      unlit_.push_back(static_cast<std::uint32_t>(scene_.meshes.size()));
+    }
+    keep(*std::move(mesh), charged);
+    return true;
   }
 
   /// Adds a mesh to the scene; `charged`: what was counted before it was read.
@@ -497,11 +504,12 @@ class SceneBuilder {
     return joints;
   }
 
-  void check_texture_coordinates(const Mesh& mesh, const std::string& where) const {
-    if (mesh.material >= scene_.materials.size()) return;
-    const Material& material = scene_.materials[mesh.material];
+  void check_texture_coordinates(std::uint32_t number, const std::array<bool, 2>& has_uvs,
+                                 const std::string& where) const {
+    if (number >= scene_.materials.size()) return;
+    const Material& material = scene_.materials[number];
     const auto check = [&](const TextureRef& ref) {
-      if (!ref.present() || !mesh.uvs[ref.uv_set].empty()) return;
+      if (!ref.present() || has_uvs.at(ref.uv_set)) return;
       context().warn(where, fmt::format("has no TEXCOORD_{} for the texture of its material", ref.uv_set));
     };
     for (const TextureRef* ref :
@@ -587,7 +595,9 @@ class GltfReader {
     for (std::size_t i = 0; i < model_.skins.size(); ++i) {
       context_.check_entry("skins", i, [&] { check_skin(*data_, i); });
     }
-    GltfMaterials(*data_, buffers_, images).build(scene_);
+    GltfMaterials materials(*data_, buffers_, images);
+    materials.build(scene_);
+    sources_ = materials.take_sources();
     builder_.emplace(*data_, scene_);
     builder_->build();
     scene_.warnings = context_.take_warnings();
@@ -598,12 +608,13 @@ class GltfReader {
   GltfReader& operator=(const GltfReader&) = delete;
   ~GltfReader() = default;
 
-  /// To be called once.
+  /// To be called once each.
   [[nodiscard]] Scene take_scene() { return std::move(scene_); }
+  [[nodiscard]] std::vector<std::shared_ptr<const PictureSource>> take_sources() { return std::move(sources_); }
 
-  [[nodiscard]] Mesh whole_mesh(std::uint32_t index) {
+  [[nodiscard]] std::unique_ptr<MeshReader> read_mesh(std::uint32_t index) {
     const std::uint64_t charged = context_.charged();
-    Mesh mesh = builder_->whole_mesh(index);
+    auto mesh = builder_->read_mesh(index);
     context_.release_to(charged);
     buffers_.forget();
     return mesh;
@@ -633,6 +644,7 @@ class GltfReader {
   tinygltf::Model model_;
   std::optional<GltfData> data_;
   Scene scene_;
+  std::vector<std::shared_ptr<const PictureSource>> sources_;
   std::optional<SceneBuilder> builder_;
 };
 
@@ -644,7 +656,8 @@ LoadedScene load_gltf(const std::filesystem::path& path, const SceneLimits& limi
   LoadedScene loaded(reader->take_scene());
   loaded.in_parts = in_parts;
   loaded.memory_limit = limits.memory_bytes;
-  if (in_parts) loaded.whole_mesh = [reader](std::uint32_t mesh) { return reader->whole_mesh(mesh); };
+  loaded.sources = reader->take_sources();
+  if (in_parts) loaded.read_mesh = [reader](std::uint32_t mesh) { return reader->read_mesh(mesh); };
   return loaded;
 }
 

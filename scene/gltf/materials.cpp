@@ -5,8 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 
+#include "core/bytes.h"
 #include "core/text.h"
+#include "image/image_io.h"
+#include "scene/gltf/uri.h"
 
 namespace hpr {
 namespace {
@@ -89,7 +93,19 @@ glm::vec3 color_of(const std::vector<double>& values, double fallback) {
 
 }  // namespace
 
+void GltfMaterials::find_emissive() {
+  const tinygltf::Model& model = data_.model();
+  emissive_.resize(images_.is_array() ? images_.size() : 0);
+  for (const tinygltf::Material& material : model.materials) {
+    const int texture = material.emissiveTexture.index;
+    if (texture < 0 || GltfData::to_size(texture) >= model.textures.size()) continue;
+    const int image = model.textures[GltfData::to_size(texture)].source;
+    if (image >= 0 && GltfData::to_size(image) < emissive_.size()) emissive_[GltfData::to_size(image)] = true;
+  }
+}
+
 void GltfMaterials::build(Scene& scene) {
+  find_emissive();
   const auto& materials = data_.model().materials;
   data_.context().charge(materials.size() * sizeof(Material), "the materials");
   for (std::size_t i = 0; i < materials.size(); ++i) {
@@ -261,16 +277,17 @@ std::int32_t GltfMaterials::texture(int index, const std::string& where, Scene& 
   if (held != pictures_.end() && held->second < 0) return -1;
   if (held != pictures_.end()) {
     const Texture& twin = scene.textures[static_cast<std::size_t>(held->second)];
-    context.charge(twin.image.pixels().size_bytes(), "a texture");
     made.image = twin.image;
     made.name = twin.name;
+    sources_.push_back(sources_[static_cast<std::size_t>(held->second)]);
   } else {
-    auto image = picture(from.source);
-    if (!image) {
+    auto read = picture(from.source);
+    if (!read) {
       pictures_[from.source] = -1;
       return -1;
     }
-    made.image = *std::move(image);
+    made.image = std::move(read->texels);
+    sources_.push_back(std::move(read->source));
     const Json& entry = images_[GltfData::to_size(from.source)];
     made.name = entry.contains("name") && entry["name"].is_string() ? entry["name"].get<std::string>()
                                                                     : fmt::format("image {}", from.source);
@@ -282,7 +299,26 @@ std::int32_t GltfMaterials::texture(int index, const std::string& where, Scene& 
   return position;
 }
 
-std::optional<Image<Rgba8>> GltfMaterials::picture(int image) {
+GltfMaterials::Picture GltfMaterials::decoded(int image, std::span<const std::byte> bytes,
+                                              const std::optional<FileLocation>& location) {
+  GltfContext& context = data_.context();
+  const std::string name = fmt::format("{}: images[{}]", context.name(), image);
+  // Decoding holds the file's channels beside the result.
+  ImageLimits limits = context.limits().image;
+  limits.pixels = std::min(limits.pixels, context.memory_left() / 8);
+  Picture picture{decode_image(bytes, name, limits), nullptr};
+  if (!location || emissive_[GltfData::to_size(image)]) {
+    context.charge(picture.texels.size_bytes(), "a texture");
+    return picture;
+  }
+  picture.texels = Texels(picture.texels.size(), picture.texels.facts());
+  picture.source = std::make_shared<const PictureSource>(
+      PictureSource{name, std::filesystem::absolute(location->file).string(), location->file_bytes, location->offset,
+                    bytes.size(), xxh64(bytes)});
+  return picture;
+}
+
+std::optional<GltfMaterials::Picture> GltfMaterials::picture(int image) {
   GltfContext& context = data_.context();
   const Json& entry = images_[GltfData::to_size(image)];
   const std::string where = fmt::format("images[{}]", image);
@@ -295,20 +331,20 @@ std::optional<Image<Rgba8>> GltfMaterials::picture(int image) {
   if (has_uri && has_view) context.warn(where, "has a uri and a bufferView; the bufferView is read");
   if (has_view && !entry.contains("mimeType")) context.warn(where, "has no mimeType");
   try {
-    FileBytes file;
-    std::span<const std::byte> bytes;
     if (has_view) {
-      bytes = data_.view(entry["bufferView"].get<int>());
-    } else {
-      file = buffers_.resolve(entry["uri"].get<std::string>(), where, context);
-      bytes = file.bytes();
+      const std::span<const std::byte> bytes = data_.view(entry["bufferView"].get<int>());
+      Picture read = decoded(image, bytes, buffers_.location_of(bytes));
+      if (context.reads_in_parts()) data_.forget();
+      return read;
     }
-    // Decoding holds the file's channels beside the result.
-    ImageLimits limits = context.limits().image;
-    limits.pixels = std::min(limits.pixels, context.memory_left() / 8);
-    Image<Rgba8> decoded = decode_image(bytes, fmt::format("{}: {}", context.name(), where), limits);
-    context.charge(decoded.pixels().size_bytes(), "a texture");
-    return decoded;
+    const auto uri = entry["uri"].get<std::string>();
+    const FileBytes file = buffers_.resolve(uri, where, context);
+    std::optional<FileLocation> location;
+    if (context.reads_in_parts() && !is_data_uri(uri)) {
+      location = {std::filesystem::path(context.name()).parent_path() / jailed_path(uri, where), file.bytes().size(),
+                  0};
+    }
+    return decoded(image, file.bytes(), location);
   } catch (const Error& error) {
     // A scene without one of its pictures is still worth drawing; past the limits the user has to decide.
     if (error.code() != ExitCode::BadInput && error.code() != ExitCode::Io) throw;

@@ -1,14 +1,19 @@
 #pragma once
 
+#include <cstddef>
 #include <glm/mat4x4.hpp>
 #include <map>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "core/json.h"
 #include "scene/gltf/accessors.h"
+#include "scene/picture_source.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -21,8 +26,12 @@ class GltfMaterials {
   GltfMaterials(const GltfData& data, const GltfBuffers& buffers, const Json& images)
       : data_(data), buffers_(buffers), images_(images) {}
 
-  /// Fills scene.materials, one per material of the document, and scene.textures.
+  /// Fills scene.materials, one per material of the document, and scene.textures. Where meshes are read one by one,
+  /// texels of pictures that lie in files are left out, but of those that give light.
   void build(Scene& scene);
+
+  /// Of each texture where its texels lie, if they were left out, else null.
+  [[nodiscard]] std::vector<std::shared_ptr<const PictureSource>> take_sources() { return std::move(sources_); }
 
  private:
   using SamplerKey = std::tuple<int, Wrap, Wrap, bool>;
@@ -43,12 +52,22 @@ class GltfMaterials {
     return texture_ref(info.index, info.texCoord, info.extensions, where, scene);
   }
   [[nodiscard]] std::int32_t texture(int index, const std::string& where, Scene& scene);
-  [[nodiscard]] std::optional<Image<Rgba8>> picture(int image);
+  /// Texels, or what is known of them and where they lie.
+  struct Picture {
+    Texels texels;
+    std::shared_ptr<const PictureSource> source;
+  };
+  [[nodiscard]] std::optional<Picture> picture(int image);
+  [[nodiscard]] Picture decoded(int image, std::span<const std::byte> bytes,
+                                const std::optional<FileLocation>& location);
+  void find_emissive();
 
   const GltfData& data_;
   const GltfBuffers& buffers_;
   const Json& images_;
   std::map<SamplerKey, std::int32_t> textures_;
+  std::vector<std::shared_ptr<const PictureSource>> sources_;
+  std::vector<bool> emissive_;            ///< images that give light
   std::map<int, std::int32_t> pictures_;  ///< image -> first texture that holds it, -1: cannot be drawn
 };
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "scene/gltf/pieces/vertex_rules.h"
 
 namespace hpr {
 namespace {
@@ -276,22 +277,14 @@ class PrimitiveBuilder {
   }
 
   void compare_bounds(const Vectors& positions) const {
-    const tinygltf::Accessor& accessor = data_.accessor(primitive_.attributes.at("POSITION"));
-    if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) return;
-    if (accessor.minValues.size() != 3 || accessor.maxValues.size() != 3) return;
     glm::vec3 low = positions[0];
     glm::vec3 high = positions[0];
     for (const glm::vec3& p : positions) {
       low = glm::min(low, p);
       high = glm::max(high, p);
     }
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<std::size_t>(axis);
-      const double slack = 1e-4 * (std::abs(accessor.minValues[a]) + std::abs(accessor.maxValues[a])) + 1e-6;
-      if (low[axis] < accessor.minValues[a] - slack || high[axis] > accessor.maxValues[a] + slack) {
-        data_.context().warn(where_, "vertices lie outside of the min and max their accessor declares");
-        return;
-      }
+    if (leaves_declared_bounds(data_.accessor(primitive_.attributes.at("POSITION")), low, high)) {
+      data_.context().warn(where_, "vertices lie outside of the min and max their accessor declares");
     }
   }
 
@@ -306,16 +299,8 @@ class PrimitiveBuilder {
 
   void tame_uvs(Mesh& mesh) const {
     for (const auto& [name, set] : {std::pair{"TEXCOORD_0", 0U}, std::pair{"TEXCOORD_1", 1U}}) {
-      // Samplers turn coordinates into integers; 1e6 repeats of a texture are already below what a float resolves.
-      constexpr float kMaxTexcoord = 1e6F;
       bool odd = false;
-      for (glm::vec2& uv : mesh.uvs[set]) {
-        for (int axis = 0; axis < 2; ++axis) {
-          if (std::abs(uv[axis]) <= kMaxTexcoord) continue;
-          uv[axis] = std::isfinite(uv[axis]) ? std::copysign(kMaxTexcoord, uv[axis]) : 0.0F;
-          odd = true;
-        }
-      }
+      for (glm::vec2& uv : mesh.uvs[set]) odd = tame_uv(uv) || odd;
       if (odd) data_.context().warn(where_, fmt::format("{} has values that are not finite or beyond 1e6", name));
     }
   }
@@ -335,13 +320,7 @@ class PrimitiveBuilder {
 
   void tame_colors(Mesh& mesh) const {
     bool odd = false;
-    for (glm::vec4& color : mesh.colors) {
-      for (int c = 0; c < 4; ++c) {
-        if (color[c] >= 0.0F && color[c] <= 1.0F) continue;
-        color[c] = std::isnan(color[c]) ? 1.0F : std::clamp(color[c], 0.0F, 1.0F);
-        odd = true;
-      }
-    }
+    for (glm::vec4& color : mesh.colors) odd = tame_color(color) || odd;
     if (odd) data_.context().warn(where_ + ".attributes.COLOR_0", "some values lie outside of 0 to 1; brought into it");
   }
 
@@ -482,15 +461,6 @@ class PrimitiveBuilder {
     check_positions(mesh.positions);
   }
 
-  /// The unit normal of a triangle; any direction where it has no area.
-  [[nodiscard]] static glm::vec3 flat_normal(const Mesh& mesh, const glm::uvec3& triangle) {
-    const glm::dvec3 v0(mesh.positions[triangle.x]);
-    const glm::dvec3 cross =
-        glm::cross(glm::dvec3(mesh.positions[triangle.y]) - v0, glm::dvec3(mesh.positions[triangle.z]) - v0);
-    const double length = glm::length(cross);
-    return length > 0.0 && std::isfinite(length) ? glm::vec3(cross / length) : glm::vec3(0.0F, 0.0F, 1.0F);
-  }
-
   /// One face, one normal: every triangle gets vertices of its own.
   void make_flat(Mesh& mesh) const {
     const std::size_t corners = mesh.triangles.size() * 3;
@@ -508,7 +478,8 @@ class PrimitiveBuilder {
       if (!mesh.uvs[set].empty()) flat.uvs[set].reserve(corners);
     }
     for (glm::uvec3& triangle : mesh.triangles) {
-      const glm::vec3 normal = flat_normal(mesh, triangle);
+      const glm::vec3 normal =
+          flat_normal(mesh.positions[triangle.x], mesh.positions[triangle.y], mesh.positions[triangle.z]);
       const auto first = static_cast<std::uint32_t>(flat.positions.size());
       for (int corner = 0; corner < 3; ++corner) {
         flat.positions.push_back(mesh.positions[triangle[corner]]);
@@ -524,20 +495,14 @@ class PrimitiveBuilder {
     mesh = std::move(flat);
   }
 
-  /// Normals become unit length; those without a direction are taken from the triangles around. Normals that are unit
-  /// vectors but for rounding keep their bits.
+  /// Normals become unit length; those without a direction are taken from the triangles around.
   void repair_normals(Mesh& mesh) const {
     Vectors smooth;
     bool scaled = false;
     for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
-      const glm::dvec3 normal(mesh.normals[i]);
-      const double square = glm::dot(normal, normal);
-      if (std::abs(square - 1.0) < 1e-6) continue;
-      if (square > 0.0 && std::isfinite(square)) {
-        mesh.normals[i] = glm::vec3(normal / std::sqrt(square));
-        scaled = scaled || std::abs(square - 1.0) > 0.2;
-        continue;
-      }
+      const NormalLength length = repair_normal(mesh.normals[i]);
+      scaled = scaled || length == NormalLength::Other;
+      if (length != NormalLength::None) continue;
       if (smooth.empty()) {
         data_.context().warn(where_ + ".attributes.NORMAL", "some normals have no direction; computed from the faces");
         data_.context().charge(mesh.positions.size() * sizeof(glm::vec3), "normals");
@@ -548,20 +513,9 @@ class PrimitiveBuilder {
     if (scaled) data_.context().warn(where_ + ".attributes.NORMAL", "some normals are no unit vectors; made so");
   }
 
-  /// Tangents become unit length with a sign of 1 or -1, or zero where they have no direction. Those that are unit
-  /// vectors but for rounding keep their bits.
   void repair_tangents(Mesh& mesh) const {
     bool odd = false;
-    for (glm::vec4& tangent : mesh.tangents) {
-      const glm::dvec3 along(tangent);
-      const double square = glm::dot(along, along);
-      const float sign = tangent.w < 0.0F ? -1.0F : 1.0F;
-      odd = odd || !(std::abs(square - 1.0) < 0.2) || tangent.w != sign;
-      tangent.w = sign;
-      if (std::abs(square - 1.0) < 1e-6) continue;
-      const bool directed = square > 0.0 && std::isfinite(square);
-      tangent = glm::vec4(directed ? glm::vec3(along / std::sqrt(square)) : glm::vec3(0.0F), sign);
-    }
+    for (glm::vec4& tangent : mesh.tangents) odd = repair_tangent(tangent) || odd;
     if (odd) {
       data_.context().warn(where_ + ".attributes.TANGENT", "some tangents are no unit vectors with a sign; made so");
     }
@@ -573,6 +527,17 @@ class PrimitiveBuilder {
 };
 
 }  // namespace
+
+bool leaves_declared_bounds(const tinygltf::Accessor& positions, const glm::vec3& low, const glm::vec3& high) {
+  if (positions.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) return false;
+  if (positions.minValues.size() != 3 || positions.maxValues.size() != 3) return false;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const double slack = 1e-4 * (std::abs(positions.minValues[a]) + std::abs(positions.maxValues[a])) + 1e-6;
+    if (low[axis] < positions.minValues[a] - slack || high[axis] > positions.maxValues[a] + slack) return true;
+  }
+  return false;
+}
 
 std::vector<glm::uvec3> triangles_of(int mode, std::size_t count, std::span<const std::uint32_t> indices) {
   const std::size_t corners = indices.empty() ? count : indices.size();

@@ -30,6 +30,10 @@ void check_meshes(const GltfData& data);
                                                   const std::string& where, const GltfPose& pose,
                                                   std::uint32_t default_material);
 
+/// Whether positions leave the box that their accessor declares. Boxes of integers are not looked at.
+[[nodiscard]] bool leaves_declared_bounds(const tinygltf::Accessor& positions, const glm::vec3& low,
+                                          const glm::vec3& high);
+
 /// The triangles of `count` vertices (or of `indices`, when there are any) in a TINYGLTF_MODE_*; left-over vertices of
 /// lists are dropped.
 [[nodiscard]] std::vector<glm::uvec3> triangles_of(int mode, std::size_t count, std::span<const std::uint32_t> indices);

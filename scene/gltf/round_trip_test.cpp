@@ -139,8 +139,9 @@ TEST(GltfRoundTrip, EveryGeneratedSceneComesBack) {
 TEST(GltfRoundTrip, WhatNoGeneratorMakesComesBackToo) {
   Scene scene = generate_scene("cornell");
   Texture texture;
-  texture.image = Image<Rgba8>({2, 1}, {1, 2, 3, 4});
-  texture.image.at(1, 0) = {250, 100, 50, 255};
+  Image<Rgba8> image({2, 1}, {1, 2, 3, 4});
+  image.at(1, 0) = {250, 100, 50, 255};
+  texture.image = std::move(image);
   texture.wrap_s = Wrap::ClampToEdge;
   texture.wrap_t = Wrap::MirroredRepeat;
   scene.textures = {texture, texture};

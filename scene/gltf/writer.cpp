@@ -101,7 +101,7 @@ int wrap_code(Wrap wrap) {
 
 void write_textures(const Scene& scene, Document& document) {
   for (const Texture& texture : scene.textures) {
-    const std::size_t view = document.add_view(encode_png(texture.image), 0);
+    const std::size_t view = document.add_view(encode_png(texture.image.image()), 0);
     const std::size_t image =
         document.add("images", {{"name", texture.name}, {"bufferView", view}, {"mimeType", "image/png"}});
     const std::size_t sampler = document.add("samplers", {{"magFilter", texture.nearest ? 9728 : 9729},

@@ -9,6 +9,8 @@
 #include "app/options/render_options.h"
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
+#include "core/log.h"
+#include "core/parallel.h"
 #include "core/progress.h"
 #include "core/timing.h"
 #include "engine/checkpoint/checkpoint.h"
@@ -34,6 +36,10 @@ struct Measured {
   FrameTimes times;
   double screen_ms = 0.0;
   double frame_ms = 0.0;
+  double processor_ms = 0.0;  ///< of all threads
+  double serial_ms = 0.0;     ///< of one thread alone
+  double even_ms = 0.0;       ///< see LoopProfile
+  double scheduled_ms = 0.0;
 };
 
 /// The median of what `of` takes out of each frame.
@@ -106,12 +112,20 @@ class Bench {
     Progress silent("none", "sample", 0);
     measure_in_turns(1, {1, frames}, [&](std::size_t /*contender*/, bool counts) {
       session_.shader(plan_.rays).discard_photons();  // of the same sample, in the frame before
+      LoopProfile profile;
       const Stopwatch watch;
       FrameSampler sampler(session_, plan_, sampling_, 0, false);
       (void)sampler.draw(blocks_.views, {}, silent);  // it stops before its goal for a checkpoint only
       const double drawn = watch.ms();
       (void)bring_to_screens(session_, sampler.frame(), blocks_, {{view_.screen}, {0}, transform_});
-      if (counts) frames_.push_back({sampler.times(), watch.ms() - drawn, watch.ms()});
+      const double ms = watch.ms();
+      profile.finish();
+      const int threads = session_.threads();
+      if (!counts) return;
+      frames_.push_back({sampler.times(), ms - drawn, ms, profile.all_ms(), profile.serial_ms(),
+                         profile.even_ms(threads), profile.scheduled_ms(threads)});
+      for (const auto& [phase, alone_ms] : profile.serial_phases())
+        log::debug("{:.2f} ms of one thread alone up to a loop of '{}'", alone_ms, phase);
     });
   }
 
@@ -129,6 +143,7 @@ class Bench {
     rows.push_back(row_of(fmt::format("the frame, {}x{}, {:g} sample{}", view_.screen.width, view_.screen.height,
                                       samples, samples == 1.0 ? "" : "s"),
                           median_of(frames_, [](const Measured& frame) { return frame.frame_ms; }), floor));
+    add_spread(rows);
     return rows;
   }
 
@@ -153,6 +168,22 @@ class Bench {
   [[nodiscard]] static double rate_of(const Rates& rates, RayPattern pattern) {
     const auto found = rates.find(name_of(pattern));
     return found == rates.end() ? 0.0 : found->second;
+  }
+
+  /// How the frame's work spreads over threads, as LoopProfile has it; the floors are all of its processor time by as
+  /// many threads. One thread shares with nobody.
+  void add_spread(std::vector<BenchRow>& rows) const {
+    const int threads = session_.threads();
+    const double all = median_of(frames_, [](const Measured& frame) { return frame.processor_ms; });
+    rows.push_back(row_of("processor time", all, 0.0));
+    if (threads < 2) return;
+    const auto add = [&](std::string name, double Measured::*value, double floor) {
+      rows.push_back(
+          row_of(std::move(name), median_of(frames_, [&](const Measured& frame) { return frame.*value; }), floor));
+    };
+    add("of one thread alone", &Measured::serial_ms, 0.0);
+    add(fmt::format("{} threads, loops shared evenly", threads), &Measured::even_ms, all / threads);
+    add(fmt::format("{} threads, loops as they are", threads), &Measured::scheduled_ms, all / threads);
   }
 
   [[nodiscard]] BenchRow keys_row(double floor_ms_of_sample) const {

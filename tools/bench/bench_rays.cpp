@@ -222,7 +222,7 @@ std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const Vi
 
 /// bench_rays of a picture of `side` x `side` pixels by the scene's first camera.
 std::vector<BenchRow> bench_picture(const Scene& scene, int side, const RayBuild& build) {
-  const RayScene rays(scene, RaySpace(scene.bounds), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
+  const RayScene rays(scene, RaySpace(scene), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
   const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
   return bench_rays(scene, rays, make_view(camera, {side, side}, scene.bounds));
 }

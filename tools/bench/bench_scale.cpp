@@ -49,6 +49,10 @@ class WallBench {
     run_.ranks = session.comm().size();
     run_.threads = session.threads();
     run_.hosts = static_cast<int>(std::set<std::string>(hosts.begin(), hosts.end()).size());
+    const std::vector<std::string> gpus = all_gather_texts(session.comm(), session.gpu());
+    std::set<std::string> used(gpus.begin(), gpus.end());
+    used.erase("");
+    run_.gpus = static_cast<int>(used.size());
   }
 
   /// Collective. On rank 0 what was measured.
@@ -158,6 +162,7 @@ std::vector<Column<ScaleRun>> report_columns(const ScaleReport& report) {
        {.title = "tiles", .align = Align::Left, .width = 7}},
       field<Run>("ranks", &Run::ranks, {.title = "ranks", .width = 5}),
       field<Run>("threads", &Run::threads, {.title = "cores/rank", .width = 10}),
+      field<Run>("gpus", &Run::gpus, {.title = "GPUs", .width = 5}),
       field<Run>("hosts", &Run::hosts, {.title = "hosts", .width = 5}),
       {"oversubscribed", [&](const Run& run) { return Json(report.oversubscribed(run)); }},
       {"frames", [](const Run& run) { return Json(run.ms.size()); }},
@@ -256,6 +261,7 @@ const std::vector<Column<ScaleRun>>& scale_job_columns() {
                                                     "rows", [](auto& run) -> auto& { return run.grid.height; }),
                                                 field<Run>("ranks", &Run::ranks),
                                                 field<Run>("threads", &Run::threads),
+                                                field<Run>("gpus", &Run::gpus),
                                                 field<Run>("hosts", &Run::hosts),
                                                 field<Run>("ms", &Run::ms),
                                                 field<Run>("rank_ms", &Run::rank_ms),
@@ -322,8 +328,8 @@ std::string scale_table(const ScaleReport& report) {
                      report.size.width, report.size.height, report.seed, report.runs.front().ms.size(),
                      report.machine.cpu, report.machine.cores, report.machine.mpi) +
          Table(report_columns(report), std::span(report.runs))
-             .text({"tiles", "threads", "ranks", "hosts", "median", "interval", "speed_up", "percent", "imbalance",
-                    "bytes_sent", "frame", "note"});
+             .text({"tiles", "threads", "ranks", "gpus", "hosts", "median", "interval", "speed_up", "percent",
+                    "imbalance", "bytes_sent", "frame", "note"});
 }
 
 std::string scale_json(const ScaleReport& report) {
@@ -420,8 +426,8 @@ std::string scale_html(const ScaleReport& report) {
   page += html_figure(plot_speed_up(report), "Medians against the least cores of the same wall.");
   page += "<h2>All runs</h2>\n" +
           Table(report_columns(report), std::span(report.runs))
-              .html({"tiles", "threads", "ranks", "hosts", "median", "low", "high", "speed_up", "percent", "imbalance",
-                     "bytes_sent", "frame"},
+              .html({"tiles", "threads", "ranks", "gpus", "hosts", "median", "low", "high", "speed_up", "percent",
+                     "imbalance", "bytes_sent", "frame"},
                     {.caption = "Milliseconds of a frame on the slowest rank, from its first triangle to its last tile "
                                 "on a screen. Speed-up and efficiency are against the least cores of the same wall; "
                                 "imbalance is the busiest rank by the mean."});

@@ -31,6 +31,7 @@ struct ScaleRun {
   int ranks = 1;
   int threads = 1;  ///< of each rank
   int hosts = 1;
+  int gpus = 0;            ///< that OpenGL draws by; 0: CPUs do its work, or rays make the keys
   std::vector<double> ms;  ///< per frame, from its first triangle to its last tile on a screen
   /// Per rank the median of the time it spends on keys and light, without compositing and bringing pixels to screens;
   /// of several jobs the least. Where photons are sent, that includes waiting for those of the others.
@@ -79,7 +80,7 @@ struct ScaleFigures {
 /// Whether all runs of a wall made the same picture.
 [[nodiscard]] bool pictures_agree(const ScaleReport& report);
 
-/// A table in the shape of the thesis's table 6.1: cores of a rank, ranks, hosts, time, speed-up.
+/// A table in the shape of the thesis's table 6.1: cores of a rank, ranks, GPUs, hosts, time, speed-up.
 [[nodiscard]] std::string scale_table(const ScaleReport& report);
 /// Schema hpr.bench-scale/1.
 [[nodiscard]] std::string scale_json(const ScaleReport& report);

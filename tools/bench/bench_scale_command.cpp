@@ -16,6 +16,8 @@
 #include "core/text.h"
 #include "scene/view.h"
 #include "tools/bench/bench_scale.h"
+#include "tools/bench/scale_model.h"
+#include "tools/simulated_cluster.h"
 #include "tools/sweep.h"
 #include "walls/config/wall_file.h"
 
@@ -42,23 +44,6 @@ std::optional<JobOrder> job_order() {
   return order;
 }
 
-/// In the order of their first mention.
-std::vector<int> each_once(const std::vector<int>& counts) {
-  std::vector<int> once;
-  for (const int count : counts) {
-    if (std::ranges::find(once, count) == once.end()) once.push_back(count);
-  }
-  return once;
-}
-
-/// 1, 2, 4 .. and `max`.
-std::vector<int> powers_of_two_up_to(int max) {
-  std::vector<int> counts;
-  for (int count = 1; count < max; count *= 2) counts.push_back(count);
-  counts.push_back(max);
-  return counts;
-}
-
 /// `hpr bench scale`: the same frames by jobs of several sizes, as MPI jobs of this program.
 class BenchScaleCommand final : public Command {
  public:
@@ -83,6 +68,7 @@ class BenchScaleCommand final : public Command {
   [[nodiscard]] std::vector<int> given_ranks(const Globals& globals) const;
   [[nodiscard]] std::vector<int> given_threads(const Globals& globals) const;
   [[nodiscard]] std::vector<Job> jobs(const Globals& globals) const;
+  [[nodiscard]] ExitCode run_model(const Globals& globals, const ScaleInput& input) const;
   [[nodiscard]] ExitCode run_in_job(const Globals& globals, const ScaleInput& input) const;
   [[nodiscard]] ExitCode run_jobs(const Globals& globals, const ScaleInput& input) const;
   [[nodiscard]] ExitCode finish(const Globals& globals, const ScaleInput& input, std::vector<ScaleRun> runs) const;
@@ -94,6 +80,9 @@ class BenchScaleCommand final : public Command {
   std::string threads_;
   int frames_ = 5;
   int warmup_ = 1;
+  std::string simulate_;
+  int sides_ = 0;
+  std::optional<Option> reps_option_;
   std::string csv_;
   std::string html_;
   bool json_ = false;
@@ -111,21 +100,30 @@ void BenchScaleCommand::declare(const OptionSet& options) {
       .option("--threads", threads_,
               "numbers of cores of each rank (default: 1; without --ranks all that the machine's cores suffice for)")
       .type("LIST");
-  options.option("--reps", frames_, "measured frames of each").range(1, 100'000).show_default();
+  reps_option_ = options.option("--reps", frames_, "measured frames of each").range(1, 100'000).show_default();
   options.option("--warmup", warmup_, "frames of each job before those").range(0, 1000).show_default();
-  options.option("--csv", csv_, "write one line per frame").type("FILE");
+  options
+      .option("--simulate", simulate_,
+              "model the frames of a cluster by what one core takes here: hosts=64,ranks=512,latency=2us,"
+              "bandwidth=12.5GB/s[,cores=,overhead=,local-latency=,local-bandwidth=,merge=]")
+      .type("CLUSTER");
+  options
+      .option("--sides", sides_, "with --simulate: the mean of views from so many sides of the scene (0: the camera's)")
+      .range(0, 64)
+      .show_default();
+  options.option("--csv", csv_, "write one line per frame; with --simulate per run").type("FILE");
   options.option("--html", html_, "write the result as one page with a plot").type("FILE");
   (void)declare_settings(options, settings_, SettingScope::Pictures);
   options.flag("--json", json_, "one JSON document");
 }
 
 std::vector<int> BenchScaleCommand::given_ranks(const Globals& globals) const {
-  if (!ranks_.empty()) return each_once(parse_counts(ranks_, "--ranks"));
+  if (!ranks_.empty()) return parse_counts(ranks_, "--ranks");
   return globals.ranks > 0 ? std::vector{globals.ranks} : std::vector<int>{};
 }
 
 std::vector<int> BenchScaleCommand::given_threads(const Globals& globals) const {
-  if (!threads_.empty()) return each_once(parse_counts(threads_, "--threads"));
+  if (!threads_.empty()) return parse_counts(threads_, "--threads");
   return globals.threads > 0 ? std::vector{globals.threads} : std::vector<int>{};
 }
 
@@ -161,6 +159,13 @@ ScaleInput BenchScaleCommand::make_input(const Globals& globals) const {
                 "write e.g. --spp 16");
   }
   if (!input.settings.is_given("primary")) input.settings.frame.primary = Primary::Raster;
+  if (!input.settings.is_given("distribute") && !input.settings.frame.in_parts()) {
+    input.settings.frame.distribution = Distribution::SortFirst;
+  } else if (!input.settings.frame.distribution && !input.settings.frame.in_parts()) {
+    throw Error(ExitCode::Usage,
+                "bench scale draws the same frame at every size: --distribute auto may choose otherwise for each",
+                fmt::format("say one of {}", distribution_names()));
+  }
   if (input.settings.frame.primary == Primary::Auto) {
     throw Error(ExitCode::Usage,
                 "bench scale draws the same frame at every size: --primary auto may choose another way",
@@ -177,7 +182,40 @@ ExitCode BenchScaleCommand::run(const Globals& globals) {
   const ScaleInput input = make_input(globals);
   (void)jobs(globals);  // refuses what is no list
   if (!job_order()) check_files(globals);
+  if (!simulate_.empty()) return run_model(globals, input);
+  if (sides_ > 0) throw Error(ExitCode::Usage, "--sides is for --simulate", "leave it out: frames are the camera's");
   return inside_mpi_job() ? run_in_job(globals, input) : run_jobs(globals, input);
+}
+
+ExitCode BenchScaleCommand::run_model(const Globals& globals, const ScaleInput& input) const {
+  if (!given_ranks(globals).empty() || !given_threads(globals).empty() || inside_mpi_job()) {
+    throw Error(ExitCode::Usage, "--simulate excludes --ranks, --threads and mpirun",
+                "the number of ranks is said by --simulate ranks=N, each has a core");
+  }
+  const FrameSettings& frame = input.settings.frame;
+  if (frame.in_parts() || frame.shading == Shading::Local || frame.rays.reference) {
+    throw Error(ExitCode::Usage, "there is no model of frames with --data partitioned, --shading local or --reference",
+                "leave them out, or measure without --simulate");
+  }
+  for (const char* const name : {"distribute", "strategy", "balance"}) {
+    if (!settings_.is_given(name)) continue;
+    throw Error(ExitCode::Usage, fmt::format("--simulate models every distribution by demand: --{} says nothing", name),
+                "leave it out");
+  }
+  if (reps_option_->specified()) {
+    throw Error(ExitCode::Usage, "--simulate draws each view once after the --warmup: --reps says nothing",
+                "leave it out");
+  }
+  const SimulatedCluster cluster = parse_simulation(simulate_);
+  if (cluster.slowdown() > 1.0) {
+    throw Error(ExitCode::Usage, "in bench scale --simulate each rank has a core",
+                "say cores=N for as many ranks a host");
+  }
+  const ScaleModelReport report = model_scale(globals, input, cluster, sides_);
+  write_if_named(csv_, [&] { return scale_model_csv(report); });
+  write_if_named(html_, [&] { return scale_model_html(report); });
+  std::fputs((json_ ? scale_model_json(report) : scale_model_table(report)).c_str(), stdout);
+  return ExitCode::Done;
 }
 
 ExitCode BenchScaleCommand::run_in_job(const Globals& globals, const ScaleInput& input) const {

@@ -29,6 +29,7 @@
 #include "tools/compare/compare_options.h"
 #include "tools/compare/compare_report.h"
 #include "tools/compare/distributions/distribution_comparison.h"
+#include "tools/simulated_cluster.h"
 #include "tools/sweep.h"
 #include "walls/config/wall_file.h"
 #include "walls/geometry/geometry.h"

@@ -8,7 +8,6 @@
 #include "app/options/globals.h"
 #include "app/options/option_set.h"
 #include "app/options/render_options.h"
-#include "cluster/transport/simulated_communicator.h"
 #include "image/image.h"
 #include "tools/compare/compare.h"
 
@@ -17,11 +16,6 @@ namespace hpr {
 
 /// A list of strategies; numbers in it belong to the strategy before them: "tree,radix-k:4,2,ring".
 [[nodiscard]] std::vector<std::string> split_strategies(std::string_view list);
-
-/// "hosts=64,ranks=512,latency=2us,bandwidth=12.5GB/s" and, as far as given, cores, overhead, local-latency,
-/// local-bandwidth, merge (SimulatedCluster). `bandwidth` is a host's, which its ranks share. Throws Error (Usage) on
-/// unknown keys, with the nearest one, and on values that make no sense.
-[[nodiscard]] SimulatedCluster parse_simulation(std::string_view text);
 
 /// The options' values, and what follows from them alone.
 struct CompareOptions {

@@ -9,6 +9,7 @@
 #include "compositing/model/synthetic.h"
 #include "core/error.h"
 #include "tools/compare/compare.h"
+#include "tools/simulated_cluster.h"
 
 namespace hpr {
 namespace {

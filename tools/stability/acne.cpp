@@ -73,7 +73,7 @@ std::size_t shadowed_pixels(Scene scene, const Placement& at, int threads) {
   settings.passes = {};
   settings.auto_passes = false;
   const LitPicture open = lit_picture(scene, view, settings);
-  const Surfaces surfaces(scene, RaySpace(scene.bounds));
+  const Surfaces surfaces(scene, RaySpace(scene));
   WorldTriangle triangle;
   std::size_t differing = 0;
   std::size_t lit = 0;

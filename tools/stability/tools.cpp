@@ -270,7 +270,7 @@ Mesh parallelogram(const glm::dvec3& corner, const glm::dvec3& a, const glm::dve
 
 LitPicture lit_picture(const Scene& scene, const View& view, const RaySettings& settings) {
   LitPicture picture{TileLayer<Key>(FrameLayout({view.size()})), {}, {}};
-  const RayScene rays(scene, RaySpace(scene.bounds), settings.threads);
+  const RayScene rays(scene, RaySpace(scene), settings.threads);
   PrimaryRays(scene, rays, settings.threads).draw(view, 0, std::array{whole(view)}, picture.keys);
   TileLayer<Rgb> radiance(picture.keys.layout());
   DeferredShader shader(scene, settings);

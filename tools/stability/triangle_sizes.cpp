@@ -138,10 +138,10 @@ std::vector<StabilityFinding> horizon(Drawer& drawer) {
 double wrong_squares(const Globals& globals, double reach, std::uint64_t& not_finite) {
   Scene scene;
   Texture checker;
-  checker.image = Image<Rgba8>({2, 2});
+  Image<Rgba8> squares({2, 2});
+  for (int i = 0; i < 4; ++i) squares.at(i % 2, i / 2) = i % 3 == 0 ? Rgba8{255, 255, 255, 255} : Rgba8{0, 0, 0, 255};
+  checker.image = std::move(squares);
   checker.nearest = true;
-  for (int i = 0; i < 4; ++i)
-    checker.image.at(i % 2, i / 2) = i % 3 == 0 ? Rgba8{255, 255, 255, 255} : Rgba8{0, 0, 0, 255};
   scene.textures.push_back(checker);
   Material material;
   material.unlit = true;

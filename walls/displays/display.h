@@ -131,10 +131,11 @@ struct DisplayOptions {
 /// One way to show a wall; defined in the file of its name.
 struct DisplayKind {
   std::string_view name;
-  bool whole_wall = false;   ///< one process shows all screens, whichever rank the wall file names
-  bool interactive = false;  ///< has a viewer who moves the camera, and who ends the run
-  bool monitors = false;     ///< shows the operator's monitors too
-  bool stream = false;       ///< what it was given cannot be taken back: a job that is lost does not go on
+  bool whole_wall = false;           ///< one process shows all screens, whichever rank the wall file names
+  bool interactive = false;          ///< has a viewer who moves the camera, and who ends the run
+  bool monitors = false;             ///< shows the operator's monitors too
+  bool shows_on_any_thread = false;  ///< show() may run on another thread while the next frame is drawn
+  bool stream = false;               ///< what it was given cannot be taken back: a job that is lost does not go on
   /// Whether it takes pictures with alpha, colours not multiplied by it; null, or false: they come before black.
   bool (*keeps_alpha)(const DisplayOptions& options) = nullptr;
   /// Throws Error: Usage for options that do not fit, Io when what is to be written to cannot be or holds what may not

@@ -127,6 +127,7 @@ std::vector<std::filesystem::path> files_of_display(const Wall& wall, const std:
 DisplayKind file_display() {
   return {.name = "file",
           .monitors = true,
+          .shows_on_any_thread = true,
           .keeps_alpha = [](const DisplayOptions&) { return true; },
           .make = make_file_display,
           .check = check_file_display};

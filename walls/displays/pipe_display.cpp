@@ -116,6 +116,7 @@ PipeFormat parse_pipe_format(const std::string& name) {
 DisplayKind pipe_display() {
   return {.name = "pipe",
           .whole_wall = true,
+          .shows_on_any_thread = true,
           .stream = true,
           .keeps_alpha = [](const DisplayOptions& options) { return options.pipe.format == PipeFormat::Rgba; },
           .make = make_pipe_display,

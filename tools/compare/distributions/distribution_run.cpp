@@ -93,6 +93,7 @@ void DistributionRun::append(const DistributionRun& more) {
   }
   if (memory_of == kMemoryOfRank) memory_of = more.memory_of;  // what is said of the peaks holds for all of them
   differing_pixels = std::max(differing_pixels, more.differing_pixels);
+  if (chosen.find(more.chosen) == std::string::npos) chosen += ", " + more.chosen;
   if (!predicted_ms) predicted_ms = more.predicted_ms;
 }
 

@@ -67,7 +67,8 @@ struct RankFrame {
 /// Frames of one distribution on one number of ranks; lists have one entry a frame, but for the one of ranks.
 struct DistributionRun {
   std::string distribution;
-  std::string chosen;                  ///< the distribution at work, where `distribution` leaves the choice
+  std::string
+      chosen;  ///< the distribution at work, where `distribution` leaves the choice; of jobs that chose otherwise all
   std::string strategy = kNoStrategy;  ///< at work
   int ranks = 1;
   int threads = 1;  ///< of each rank

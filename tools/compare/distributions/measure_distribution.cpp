@@ -92,9 +92,13 @@ class DistributionBench {
     return whole;
   }
 
-  /// Collective. What a frame was to take, once some were drawn.
-  [[nodiscard]] std::optional<double> predict() {
-    return predict_frame_ms(session_, plan(), maker_.blocks().views, maker_.times().samples);
+  /// Collective. What a frame is to take, by what this rank measured of one before.
+  [[nodiscard]] std::optional<double> predict(const RankFrame& before) {
+    const RankStages& stages = before.stages;
+    const double shared_out =
+        stages.chunks_ms + stages.draw_ms + stages.composite_ms + stages.move_ms + stages.light_ms + stages.return_ms;
+    return predict_frame_ms(session_, plan(), maker_.blocks().views, maker_.times().samples,
+                            std::max(before.ms - shared_out, 0.0));
   }
 
   /// Collective. The compositing strategy at work.
@@ -162,11 +166,14 @@ DistributionRun measure_distribution(Communicator& comm, const Globals& globals,
   run.ranks = comm.size();
   run.threads = session.threads();
   run.transport = comm.transport();
-  if (!settings.frame.distribution) run.chosen = name_of(bench.plan().distribution);
   const bool is_local = settings.frame.shading == Shading::Local;
   measure_in_turns(1, frames, [&](std::size_t /*contender*/, bool counts) {
-    const std::vector<RankFrame> all = all_gather_value(comm, bench.draw());
-    if (!counts) return;
+    const RankFrame mine = bench.draw();
+    const std::vector<RankFrame> all = all_gather_value(comm, mine);
+    if (!counts) {
+      run.predicted_ms = bench.predict(mine);
+      return;
+    }
     run.add(all, settings.frame.shading);
     if (run.memory_peak_bytes.empty()) run.memory_peak_bytes = all_gather_value(comm, peak_memory_bytes());
     const WholeFrame whole = bench.collect();
@@ -176,8 +183,8 @@ DistributionRun measure_distribution(Communicator& comm, const Globals& globals,
     run.frame_xxh64 =
         is_local ? hash_of(frame_colors(whole.keys, true)) : hex16(xxh64(std::as_bytes(whole.keys.pixels())));
   });
+  if (!settings.frame.distribution) run.chosen = name_of(bench.plan().distribution);
   run.strategy = bench.strategy();
-  run.predicted_ms = bench.predict();
   return run;
 }
 
