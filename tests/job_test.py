@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-from processes import children_of, ranks_of, wait_gone
+from processes import children_of, ranks_of, send, wait_gone, words_of
 from program import HPR, expect, failures
 
 WALL = ["wall", "run", "2x1@64x48", "gen:cornell", "--quality", "draft", "--passes", "none", "--frames", "100000"]
@@ -98,7 +98,7 @@ def mpi_files(pids):
     """What MPI and the launcher keep outside the job's own memory: of these processes' open files and maps."""
     found = set()
     for pid in pids:
-        for line in pathlib.Path(f"/proc/{pid}/maps").read_text().splitlines():
+        for line in words_of(pid, "maps").decode().splitlines():
             if line.partition("/")[2].startswith("dev/shm/") and "deleted" not in line:
                 found.add("/" + line.partition("/")[2])
     return found
@@ -121,7 +121,7 @@ def swept(folder):
     killed, lone, living = jobs
     everybody = [pid for job in (killed, lone) for pid in (*children_of(job.pid), *ranks_of(job.pid))]
     for pid in [killed.pid, *children_of(killed.pid), *ranks_of(killed.pid), *children_of(lone.pid)]:
-        os.kill(pid, signal.SIGKILL)
+        send(pid, signal.SIGKILL)
     for job in (killed, lone):
         job.wait(timeout=60)
     for pid in everybody:
@@ -208,7 +208,7 @@ def asked_in_vain(folder):
                 asked = [run.pid, *processes]
         for process in asked:
             for number in (signal.SIGUSR1, signal.SIGUSR2):
-                os.kill(process, number)
+                send(process, number)
         said = run.communicate(timeout=60)[1].decode()
         expect(asked, f"{ranks} ranks: were not seen to begin")
         expect(run.returncode == 0, f"{ranks} ranks: asked in vain, left with {run.returncode}:\n{said[-1500:]}")

@@ -1,5 +1,6 @@
 """The processes of a job that a run has started."""
 
+import os
 import pathlib
 import time
 
@@ -19,6 +20,23 @@ def children_of(pid):
 def ranks_of(pid):
     """The ranks of the job of a run: children of its mpiexec, the youngest last."""
     return sorted(rank for mpiexec in children_of(pid) for rank in children_of(mpiexec))
+
+
+def words_of(pid, file):
+    """What /proc has about a process ("environ", "maps"); nothing once it has gone."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/{file}").read_bytes()
+    except OSError:
+        return b""
+
+
+def send(pid, number):
+    """A signal; False where the process has gone."""
+    try:
+        os.kill(pid, number)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def wait_gone(pid, seconds=20.0):

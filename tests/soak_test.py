@@ -23,7 +23,7 @@ import tempfile
 import time
 
 from display_harness import HPR, SCENE, Display, environment
-from processes import ranks_of
+from processes import ranks_of, send
 
 COMMANDS = ["camera 0,1.7,4 at 0,1.6,-2", "camera -3,1.7,3 at 0,1.5,-2", "camera 3,1.2,2 at 1,1.5,-2"]
 
@@ -79,11 +79,7 @@ class Run:
     def kill(self):
         ranks = self.ranks()
         if self.index > 0 and ranks and self.dice.random() < 0.5:
-            try:
-                os.kill(self.dice.choice(ranks), signal.SIGKILL)
-                self.killed["rank"] += 1
-            except ProcessLookupError:  # a job that is starting again
-                pass
+            self.killed["rank"] += send(self.dice.choice(ranks), signal.SIGKILL)  # it may be a job that is starting again
             return
         self.display.kill()
         self.display.log.close()

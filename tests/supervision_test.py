@@ -16,10 +16,12 @@ import sys
 import tempfile
 import time
 
-from processes import children_of, ranks_of
+from processes import children_of, ranks_of, send, words_of
 from program import HPR, expect, failures
 
 HOST = os.uname().nodename
+# What launchers that --launcher names need here.
+OF_LAUNCHERS = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
 
 
 class Run:
@@ -98,12 +100,28 @@ def lost_before_it_draws(folder):
     """As often as --restarts allows: nothing says that a frame ended it."""
     run = Run(folder, "early", "--ranks", "2", "--hang-timeout", "5s")
     for number in (1, 2):
-        run.wait(lambda: len(ranks_of(run.process.pid)) == 2, "starts no ranks")
-        ranks = ranks_of(run.process.pid)
-        os.kill(ranks[0], signal.SIGKILL)
+        if run.wait(lambda: len(ranks_of(run.process.pid)) == 2, "starts no ranks"):
+            send(run.rank(0), signal.SIGKILL)
         # Open MPI may wait for a rank that is lost while it starts: up to the launcher's limit.
         run.wait(lambda: run.restarts() == number, f"is not started again, time {number}", seconds=120)
     run.end()
+
+
+def lost_while_they_start(folder):
+    """Of a launcher that does not notice, and does not end when it is told to: Open MPI's, where a rank ends while they meet."""
+    rank = folder / "waits-as-rank-1"
+    rank.write_text('#!/bin/sh\n[ "$OMPI_COMM_WORLD_RANK" = 1 ] && [ ! -e {0} ] && exec sleep 1000\nexec "$@"\n'.format(folder / "again"))
+    deaf = folder / "deaf-at-first"
+    deaf.write_text('#!/bin/sh\n[ -e {0} ] && exec mpiexec -n 2 {1} "$@"\ntrap "" TERM\nmpiexec -n 2 {1} "$@"\ntouch {0}\nexec sleep 1000\n'.format(folder / "again", rank))
+    for script in (rank, deaf):
+        script.chmod(0o755)
+    os.environ.update(OF_LAUNCHERS)
+    run = Run(folder, "deaf", "--ranks", "2", "--launcher", str(deaf), "--hang-timeout", "10")
+    has_met = lambda pid: b"OMPI_COMM_WORLD_RANK=0\0" in words_of(pid, "environ") and b"hpr-job-board" in words_of(pid, "maps")
+    waiting = lambda: [pid for mpiexec in ranks_of(run.process.pid) for pid in children_of(mpiexec) if has_met(pid)]
+    if run.wait(waiting, "starts no rank 0"):
+        send(waiting()[0], signal.SIGKILL)
+    is_started_again(run, rf"a rank ended while 2 ranks started: rank 0 on {HOST}: start of MPI; starting it again")
 
 
 def a_frame_that_ends_two_jobs(folder):
@@ -239,8 +257,7 @@ def a_lone_rank_unsupervised(folder):
 def another_launcher(folder):
     """The journal is where all hosts find it, and goes; that of a killed run goes with the next one."""
     temporary = lambda run: sorted(path.name for path in (run.folder / "out").glob(".hpr-*.part"))
-    environment = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
-    os.environ.update(environment)
+    os.environ.update(OF_LAUNCHERS)
     (folder / "mpiexec with blanks").symlink_to(subprocess.run(["which", "mpiexec"], capture_output=True, text=True, check=True).stdout.strip())
     run = Run(folder, "launcher", "--ranks", "2", "--launcher", f'"{folder}/mpiexec with blanks" -n {{ranks}}', display="remote")
     run.wait_for_frame()
@@ -279,7 +296,7 @@ def another_launcher(folder):
     elsewhere = Run(folder, "elsewhere", "--ranks", "3", "--launcher", f"mpiexec -n {{ranks}} {hidden}")
     elsewhere.wait_for_frame()
     os.kill(next(pid for pid in ranks_of(elsewhere.process.pid)
-                 if b"OMPI_COMM_WORLD_RANK=1\0" in pathlib.Path(f"/proc/{pid}/environ").read_bytes()), signal.SIGKILL)
+                 if b"OMPI_COMM_WORLD_RANK=1\0" in words_of(pid, "environ")), signal.SIGKILL)
     is_started_again(elsewhere, r"process rank 1 .*[\s\S]*a rank or mpiexec was ended by signal 9")
     for words, mention in (("env", "not as a rank of an MPI job"), ("no-such-launcher -n 2", "no no-such-launcher on the PATH"), ('"', "is no command")):
         wrong = subprocess.run([HPR, "wall", "run", "2x1@64x48", "gen:gallery", "--display", "none", "--ranks", "2", "--launcher", words], cwd=run.folder,
@@ -289,7 +306,7 @@ def another_launcher(folder):
 
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-supervision-") as scratch:
-        for case in (a_killed_rank, lost_before_it_draws, a_frame_that_ends_two_jobs, a_rank_that_stands_still,
+        for case in (a_killed_rank, lost_before_it_draws, lost_while_they_start, a_frame_that_ends_two_jobs, a_rank_that_stands_still,
                      a_hung_run_that_is_told_to_end, a_suspended_run, a_stopped_mpiexec,
                      a_stop_that_ends, a_rank_of_a_picture, nobody_is_left, nobody_hears_it, a_lone_rank_unsupervised, another_launcher):
             case(pathlib.Path(scratch))

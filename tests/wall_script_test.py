@@ -17,6 +17,7 @@ import tempfile
 import time
 
 import png
+from processes import send, words_of
 from program import HPR, expect, failures, run
 from xxh64 import xxh64
 
@@ -164,9 +165,8 @@ def check_time_limit(folder):
     os.kill(int((folder / "fake.log.step").read_text()), signal.SIGUSR1)
     for pid in subprocess.run(["pgrep", "-f", f" display --wall .*{job.out}"], capture_output=True, text=True, check=False).stdout.split():
         if int(pid) != job.process.pid:
-            command = pathlib.Path(f"/proc/{pid}/cmdline").read_bytes()
-            if command.startswith(HPR.encode()):
-                os.kill(int(pid), signal.SIGUSR1)
+            if words_of(pid, "cmdline").startswith(HPR.encode()):
+                send(int(pid), signal.SIGUSR1)
     code = job.leave()
     expect(code == 0, f"the stopped job left with {code}:\n{job.said()}")
     expect("scontrol requeue 4712" in job.calls(), f"not requeued:\n{job.calls()}\n{job.said()}")

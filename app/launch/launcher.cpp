@@ -402,6 +402,8 @@ class RunningJob {
   [[nodiscard]] const RankWatch& ranks() const { return watch_; }
   /// Its ranks had not started in time, and it was ended.
   [[nodiscard]] bool late() const { return late_; }
+  /// A rank ended while they started, and what started them went on, until it was ended.
+  [[nodiscard]] bool lost_early() const { return lost_early_; }
   /// Whether the job was killed, because it did not end in time after SIGTERM.
   [[nodiscard]] bool killed() const { return killed_; }
   [[nodiscard]] std::chrono::duration<double> start_limit() const { return start_limit_; }
@@ -486,10 +488,15 @@ class RunningJob {
     const Clock::time_point now = Clock::now();
     if (!end_requested_at_) check_ranks(now);
     if (!end_requested_at_ && (PassedSignals::ends() || output_error_ != 0)) end_requested_at_ = now;
-    if (!end_requested_at_ && !mark_.has_output() && now - begin_ > start_limit_) {
-      late_ = true;
-      end_requested_at_ = now;
-      ::kill(child_, SIGTERM);
+    if (!end_requested_at_ && !mark_.has_output()) {
+      if (!lost_at_ && watch_.first_known_to_end()) lost_at_ = now;
+      // Open MPI notices most ranks that end, but not one that ends while it introduces itself.
+      lost_early_ = lost_at_ && now - *lost_at_ > end_limit_;
+      late_ = !lost_early_ && now - begin_ > start_limit_;
+      if (lost_early_ || late_) {
+        end_requested_at_ = now;
+        ::kill(child_, SIGTERM);
+      }
     }
     if (!end_requested_at_ || killed_ || now - *end_requested_at_ <= end_limit_) return;
     log::warning("{} has not ended {:g} s after it was told to, and is killed", name_,
@@ -514,7 +521,9 @@ class RunningJob {
   std::string hang_;
   std::optional<Clock::time_point> end_requested_at_;  ///< when it was sent SIGTERM, or another signal that ends it
   int output_error_ = 0;
+  std::optional<Clock::time_point> lost_at_;  ///< when a rank was found to have ended before all had started
   bool late_ = false;
+  bool lost_early_ = false;
   bool killed_ = false;
 };
 
@@ -561,6 +570,12 @@ void check_ending(const RunningJob& job, const std::string& name, int ranks, int
     throw Error(ExitCode::Io,
                 fmt::format("cannot write to standard output: {}", std::generic_category().message(job.output_error())),
                 "free some space, or see who closed the pipe");
+  }
+  if (job.lost_early()) {
+    throw Error(
+        ExitCode::Lost,
+        fmt::format("a rank ended while {} ranks started: {}", ranks, job.ranks().first_known_to_end().value_or("one")),
+        "the system's log may say why (out of memory?)");
   }
   if (job.late()) {
     throw LateStart(

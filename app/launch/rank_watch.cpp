@@ -54,7 +54,11 @@ void RankWatch::note_ends(const std::vector<pollfd>& waited) {
 }
 
 std::optional<std::string> RankWatch::first_to_end() const {
-  if (first_.empty() || !knows_all()) return std::nullopt;
+  return knows_all() ? first_known_to_end() : std::nullopt;
+}
+
+std::optional<std::string> RankWatch::first_known_to_end() const {
+  if (first_.empty()) return std::nullopt;
   std::vector<std::string> all;
   for (const int rank : first_) {
     // What it reported after the last update() is still there.

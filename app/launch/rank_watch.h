@@ -26,8 +26,10 @@ class RankWatch {
   /// After that poll().
   void note_ends(const std::vector<pollfd>& waited);
 
-  /// Whether all ranks are on this host, and have started.
+  /// Whether all ranks are on this host, and have come to start MPI.
   [[nodiscard]] bool knows_all() const;
+  /// A rank of this host that ended, one of another may have before it; else as first_to_end().
+  [[nodiscard]] std::optional<std::string> first_known_to_end() const;
   /// The rank that ended first and in doing what; where several had ended when it was noticed, all of those. None:
   /// none is known to have ended, or it may be one of another host.
   [[nodiscard]] std::optional<std::string> first_to_end() const;

@@ -83,6 +83,8 @@ void refuse_launcher_without_mpi() {
 ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
   std::optional<CallLimit> limit;
   limit.emplace(globals.hang_limit(), "starting MPI");
+  join_job_board(launched_rank());
+  report_phase("start of MPI");
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   int rank = 0;
@@ -92,8 +94,8 @@ ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Com
     MpiCommunicator comm(MPI_COMM_WORLD, globals.hang_limit());
     limit.reset();
     if (comm.size() == 1) refuse_lone_tasks();
+    report_phase("");
     if (rank == 0) notify_launcher();
-    join_job_board(rank);
     if (globals.ranks > 0 && globals.ranks != comm.size()) {
       throw Error(ExitCode::Usage, fmt::format("--ranks {} inside a job of {} ranks", globals.ranks, comm.size()),
                   "leave --ranks out under mpirun or srun: the launcher sets the number");
