@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "rt/passes/pixel_sums.h"
+#include "scene/points_lines.h"
 
 namespace hpr {
 namespace {
@@ -24,9 +25,15 @@ constexpr std::uint32_t kSurfaceSamples = 2;
 constexpr std::uint32_t kMixedSamples = 4;
 /// Samples after which neighbours count less.
 constexpr float kNeighbourSamples = 16.0F;
-/// What is so many times as bright as all pixels about is rare light that few samples have found yet: filtered, it
-/// would make blotches.
+/// What is so many times as bright as all pixels about is rare light that few samples have found yet: filtered like
+/// the rest it would make blotches, left alone salt.
 constexpr double kFarBrighter = 3.0;
+/// Of what is beyond, pixels about share this multiple of the rest; more would show, and is left out.
+constexpr double kShared = 2.0;
+/// A lobe whose alpha is so many times the angle of a pixel blurs what it shows over the pixels about.
+constexpr double kBlurringAngles = 2.0;
+/// In place of the brightness of a pixel that the tile does not know.
+constexpr double kUnknown = -1.0;
 /// Bound of the ratio of scattered fractions, either way.
 constexpr float kMaxRatio = 4.0F;
 /// One for each FilterLobe.
@@ -49,6 +56,19 @@ std::size_t index_of(int column, int row) {
 
 std::size_t plane_index(std::uint32_t pixel) {
   return TapPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
+}
+
+/// Whether a pixel lies in the tile or so near to it. `at`: an index of planes.
+bool is_within(const TileJob& job, std::size_t at, int pixels) {
+  const glm::ivec2 pixel = TapPlanes::pixel_at(at);
+  return std::min(pixel.x, pixel.y) >= -pixels && pixel.x < job.rect.width() + pixels &&
+         pixel.y < job.rect.height() + pixels;
+}
+
+bool is_on_screen(const TileJob& job, std::size_t at) {
+  const glm::ivec2 pixel = job.origin() + TapPlanes::pixel_at(at);
+  const Size& screen = job.view->screen;
+  return std::min(pixel.x, pixel.y) >= 0 && pixel.x < screen.width && pixel.y < screen.height;
 }
 
 /// Sum i, see Denoiser::each_sum.
@@ -99,6 +119,8 @@ void Denoiser::add_vertices(const LightContext& context, std::span<const PathVer
     double roughness = point.material.roughness;
     if (point.bsdf.present(Lobe::Coat)) roughness = std::min(roughness, point.bsdf.roughness(Lobe::Coat));
     seen.width = std::clamp(static_cast<float>(roughness) / kSmooth, kMinWidth, 1.0F);
+    seen.alpha = roughness < Bsdf::kDeltaRoughness ? 0.0F : static_cast<float>(roughness * roughness);
+    seen.blur = 0.0F;
     seen.diffuse = glm::vec3(point.bsdf.weight(Lobe::Diffuse));
     seen.specular = glm::vec3(0.0F);
     seen.separate_diffuse = seen.width < 1.0F && seen.diffuse != glm::vec3(0.0F) && knows_diffuse(context);
@@ -132,6 +154,13 @@ bool Denoiser::keeps(const LightContext& context, std::size_t sum) {
   return keeps_direct(context.scene) && (sum == 0 || sum == 1 + kDirect || sum == 1 + kShadow);
 }
 
+glm::dvec3 Denoiser::kept_light(const PixelSums& sums, std::size_t sum, std::uint32_t pixel) {
+  const auto kept = [&](std::size_t component) {
+    return sums.components.at(component)[pixel] - sums.diffuse_components.at(component)[pixel];
+  };
+  return sum == 0 ? kept(kDirect) + kept(kShadow) : kept(sum - 1);
+}
+
 template <typename Body>
 void Denoiser::each_pixel(const TileJob& job, std::span<const TileJob> margin, const Body& body) {
   for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) body(job.first_pixel + pixel, plane_index(pixel));
@@ -162,15 +191,29 @@ void Denoiser::set_taps(const TileJob& job, std::span<const TileJob> margin) {
   });
 }
 
+void Denoiser::set_blur(const LightContext& context, const TileJob& job, std::span<const TileJob> margin) {
+  const NeighborFeatures<float>& taps = *taps_;
+  // Parallel rays see all of a plane from one side.
+  const auto blurring =
+      static_cast<float>(context.view->orthographic ? 0.0 : kBlurringAngles * footprint_of(*context.view).metres);
+  each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
+    if (states_[own] != State::Tap) return;
+    PixelFeature& seen = pixel_features_[own];
+    if (seen.alpha == 0.0F || seen.width == 1.0F) return;
+    for (const std::size_t about : {at - TapPlanes::kStride, at - 1, at + 1, at + TapPlanes::kStride}) {
+      const glm::vec3 turned = taps.shading_normal.at(about) - seen.shading_normal;
+      if (taps.kinds.at(about) == taps.kinds.at(at) && glm::dot(turned, turned) > square(seen.alpha)) return;
+    }
+    seen.blur = seen.alpha > blurring ? 1.0F : seen.alpha / blurring;
+  });
+}
+
 void Denoiser::set_light(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
                          const PixelSums& sums) {
   const auto set = [&](TapVectors<double>& lent, const auto& light_of) {
     each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
       lent.set(at, states_[own] == State::Tap ? light_of(own) : glm::dvec3(0.0));
     });
-  };
-  const auto kept = [&](std::size_t fragment, std::uint32_t pixel) {
-    return sums.components.at(fragment)[pixel] - sums.diffuse_components.at(fragment)[pixel];
   };
   light_.resize(sums_);
   if (some_separate_) diffuse_light_.resize(sums_);
@@ -179,8 +222,7 @@ void Denoiser::set_light(const LightContext& context, const TileJob& job, std::s
     set(light_[i], [&](std::uint32_t pixel) { return sum_of(sums, i)[pixel]; });
     if (some_separate_) set(diffuse_light_[i], [&](std::uint32_t pixel) { return diffuse_of(sums, i)[pixel]; });
     if (!keeps(context, i)) return;
-    set(kept_light_[i],
-        [&](std::uint32_t pixel) { return i == 0 ? kept(kDirect, pixel) + kept(kShadow, pixel) : kept(i - 1, pixel); });
+    set(kept_light_[i], [&](std::uint32_t pixel) { return kept_light(sums, i, pixel); });
   });
 }
 
@@ -235,9 +277,10 @@ double Denoiser::sky_light(const LightContext& context, const PixelFeature& seen
 
 void Denoiser::set_apart(const LightContext& context, const PixelSums& sums, const TileJob& job,
                          std::span<const TileJob> margin) {
-  brightness_.fill(0.0);
+  excess_.clear();
+  brightness_.fill(kUnknown);
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
-    const bool is_lit = own >= spare_ || job.wants(own - job.first_pixel);
+    const bool is_lit = own >= spare_ || (is_within(job, at, 0) && job.wants(own - job.first_pixel));
     if (is_lit) brightness_.at(at) = brightness(sums.radiance[own]);
   });
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
@@ -249,10 +292,88 @@ void Denoiser::set_apart(const LightContext& context, const PixelSums& sums, con
         if (about != at) brightest = std::max(brightest, brightness_.at(about));
       }
     }
-    const bool is_far_brighter = states_[own] == State::Tap && brightness(light) > kFarBrighter * brightest &&
-                                 brightness(light) > sky_light(context, pixel_features_[own]);
-    if (!fits_floats(light) || is_far_brighter) states_[own] = State::Apart;
+    if (!fits_floats(light)) states_[own] = State::Apart;
+    if (states_[own] != State::Tap) return;
+    const PixelFeature& seen = pixel_features_[own];
+    const double expected = std::max(kFarBrighter * brightest, sky_light(context, seen));
+    if (!(brightness(light) > expected)) return;
+    if (seen.width < 1.0F && seen.blur == 0.0F) {  // what it mirrors may have lines and points
+      states_[own] = State::Apart;
+      return;
+    }
+    const double filtered = brightness(keeps(context, 0) ? light - kept_light(sums, 0, own) : light);
+    if (filtered > expected) {
+      const double beyond = 1.0 - expected / filtered;
+      excess_.push_back({own, at, beyond, std::min(beyond, kShared * expected / filtered)});
+    }
   });
+  std::ranges::sort(excess_, {}, &Excess::at);  // row by row, wherever tiles end
+}
+
+void Denoiser::take_excess() {
+  for (const Excess& excess : excess_) {
+    if (states_[excess.pixel] != State::Tap) continue;
+    const auto scale = [&](TapVectors<double>& light, const glm::dvec3& kept) {
+      const glm::dvec3 all = light.at(excess.at);
+      light.set(excess.at, all - excess.fraction * (all - kept));
+    };
+    each_sum([&](std::size_t i) {
+      scale(light_[i], i < kept_light_.size() ? kept_light_[i].at(excess.at) : glm::dvec3(0.0));
+      if (some_separate_) scale(diffuse_light_[i], glm::dvec3(0.0));
+    });
+  }
+}
+
+double Denoiser::window_sum(const TileJob& job, std::size_t at, int radius) const {
+  const bool is_own = is_within(job, at, 0);
+  double sum = 0.0;
+  for (int y = -radius; y <= radius; ++y) {
+    for (int x = -radius; x <= radius; ++x) {
+      const std::size_t about = at + static_cast<std::size_t>(y * TapPlanes::kStride + x);
+      if (is_own ? brightness_.at(about) == kUnknown : !is_on_screen(job, about)) continue;
+      sum += std::max(0.0, 1.0 - static_cast<double>(x * x + y * y) / square(static_cast<float>(radius + 1)));
+    }
+  }
+  return sum;
+}
+
+void Denoiser::share_excess(const LightContext& context, const TileJob& job, const PixelSums& sums) {
+  const int radius = reach(job.number.sample) - 1;
+  for (const Excess& excess : excess_) {
+    if (states_[excess.pixel] != State::Tap) continue;
+    const PixelFeature& seen = pixel_features_[excess.pixel];
+    FilterCenter<float> center = center_of(*job.view, seen.feature, 0);
+    center.pixel = TapPlanes::pixel_at(excess.at);
+    center.separate_diffuse = seen.separate_diffuse;
+    center.normal = seen.shading_normal;
+    center.sharpness = sharpness_of(narrowed_ * seen.width);
+    center.window = window_about(center.pixel, center.offset, radius);
+    center.reach = static_cast<float>(radius) + 1.0F;
+    joint_bilateral_weights(*taps_, center, weights_);
+    const auto add = [&](const glm::ivec2& to, double fraction) {
+      if (to.x < 0 || to.y < 0 || to.x >= job.rect.width() || to.y >= job.rect.height()) return;
+      const auto pixel = static_cast<std::uint32_t>(index_of(to.x, to.y));
+      if (!job.wants(pixel)) return;
+      each_sum([&](std::size_t i) {
+        glm::dvec3 light = sum_of(sums, i)[excess.pixel];
+        if (keeps(context, i)) light -= kept_light(sums, i, excess.pixel);
+        filtered_.at(i)[pixel] += excess.shared * fraction * light;
+      });
+    };
+    const double whole = window_sum(job, excess.at, radius);
+    double left = 1.0;
+    for (int y = 0; y < static_cast<int>(weights_.rows); ++y) {
+      for (int x = 0; x < static_cast<int>(weights_.columns); ++x) {
+        const float weight = weights_.terms[0].red.at(static_cast<std::size_t>(y) * TapWeights<float>::kPlaces +
+                                                      static_cast<std::size_t>(x));
+        if (weight == 0.0F) continue;
+        const double fraction = static_cast<double>(weight) / whole;
+        left -= fraction;
+        add(center.window.first + glm::ivec2(x, y), fraction);
+      }
+    }
+    add(center.pixel, left);  // with what no pixel about takes
+  }
 }
 
 void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const CoverageFragment> fragments) {
@@ -273,6 +394,8 @@ void Denoiser::set_unexpected_apart(const TileJob& job, std::span<const Coverage
 void Denoiser::resample_edges(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
                               const TileFragments& fragments, RayBuffers& buffers, PixelSums& sums,
                               std::vector<PathVertex>& unfiltered) {
+  set_taps(job, margin);
+  set_blur(context, job, margin);
   set_apart(context, sums, job, margin);
   each_sum([&](std::size_t i) {
     filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
@@ -281,8 +404,11 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, s
   uncovered_.assign(sums.wants_coverage ? kTilePixels : 0, 0.0);
   narrowed_ = 1.0F / std::sqrt(std::sqrt(1.0F + static_cast<float>(job.number.sample)));
   set_unexpected_apart(job, fragments.fragments);
-  set_taps(job, margin);
+  each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
+    if (states_[own] == State::Apart) taps_->kinds.at(at) = NeighborFeatures<float>::kNoTap;
+  });
   set_light(context, job, margin, sums);
+  take_excess();
   View view = unjittered(job);
   buffers.requests.clear();
   samples_.clear();
@@ -324,12 +450,12 @@ glm::vec3 Denoiser::scattering_of(const PixelFeature& seen, FilterLobe lobe) {
 
 FilterCenter<float> Denoiser::center_at(const TileJob& job, std::uint32_t pixel, FilterLobe lobe) const {
   const PixelFeature& seen = pixel_features_[job.first_pixel + pixel];
-  const float width = lobe == FilterLobe::Diffuse ? 1.0F : seen.width;
+  const float width = lobe == FilterLobe::Diffuse ? 1.0F : std::max(seen.width, seen.blur);
   const int radius = (width < 1.0F ? 1 : 2) + (job.number.sample == 0 ? 1 : 0);
   FilterCenter<float> center = center_of(*job.view, seen.feature, pixel);
   center.separate_diffuse = seen.separate_diffuse;
   center.normal = seen.shading_normal;
-  center.sharpness = sharpness_of(narrowed_ * width);
+  center.sharpness = sharpness_of(narrowed_ * (lobe == FilterLobe::Diffuse ? 1.0F : seen.width));
   center.neighbor_weight = width / (1.0F + static_cast<float>(job.number.sample) / kNeighbourSamples);
   center.terms[0] = {static_cast<std::size_t>(lobe), scattering_of(seen, lobe)};
   center.term_count = 1;
@@ -372,6 +498,7 @@ void Denoiser::resolve(const LightContext& context, const TileJob& job, const Ti
       }
     }
   }
+  share_excess(context, job, sums);
   each_sum([&](std::size_t i) { std::ranges::copy(filtered_.at(i), sum_of(sums, i).begin() + job.first_pixel); });
 }
 

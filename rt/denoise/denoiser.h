@@ -19,9 +19,10 @@ namespace hpr {
 /// Filters a sample's light by a joint bilateral filter (joint_bilateral_filter.h), and samples pixels that silhouette
 /// edges cross at more places, shading there only what no pixel about has shaded (as in Chajdas, McGuire, Luebke,
 /// "Subpixel Reconstruction Antialiasing", 2011). From sample to sample fewer neighbors are accepted and weigh less, so
-/// that the mean of many samples is nearly the unfiltered one. Surfaces that emit, that are seen through an absorbing
-/// medium or that lie behind surfaces of partial coverage are left as they are. Only a frame's first kDenoisedSamples
-/// are filtered.
+/// that the mean of many samples is nearly the unfiltered one. Of light that few samples find, and one pixel alone,
+/// what would show is left out (docs/decisions/0028-rare-light-in-first-pictures.md). Surfaces that emit, that are seen
+/// through an absorbing medium or that lie behind surfaces of partial coverage are left as they are. Only a frame's
+/// first kDenoisedSamples are filtered.
 ///
 /// Light comes from the tile and from what its margin sees (see TileMargin), and a sample stays in itself: neither
 /// ranks nor threads change a bit.
@@ -72,6 +73,16 @@ class Denoiser {
     glm::vec3 diffuse{0.0F};   ///< about the fraction of light scattered by the diffuse lobe
     float width = 1.0F;        ///< how far normals may differ, relative to those of rough surfaces
     bool separate_diffuse = false;  ///< `width` holds for specular light only, and diffuse light is known
+    float alpha = 1.0F;             ///< of the smoothest lobe; 0: a mirror
+    float blur = 0.0F;  ///< 1: this lobe blurs what it shows over the pixels about; only where the surface is flat
+  };
+
+  /// Rare light that few samples have found yet: beyond what the pixels about have.
+  struct Excess {
+    std::uint32_t pixel = 0;  ///< as states_
+    std::size_t at = 0;       ///< an index of planes
+    double fraction = 0.0;    ///< of the pixel's light that is filtered
+    double shared = 0.0;      ///< the part of that light which the pixels about take
   };
 
   /// One more place of a pixel.
@@ -86,16 +97,25 @@ class Denoiser {
   /// Calls `body` with each pixel of the tile and then of its margin: its index into PixelSums, and that of its planes.
   template <typename Body>
   static void each_pixel(const TileJob& job, std::span<const TileJob> margin, const Body& body);
-  /// Finds pixels that stay apart.
+  /// Finds pixels that stay apart, and excess.
   void set_apart(const LightContext& context, const PixelSums& sums, const TileJob& job,
                  std::span<const TileJob> margin);
   [[nodiscard]] static double sky_light(const LightContext& context, const PixelFeature& seen);
   /// Whether there is light in a sum that stays with its pixel.
   [[nodiscard]] static bool keeps(const LightContext& context, std::size_t sum);
+  /// That light.
+  [[nodiscard]] static glm::dvec3 kept_light(const PixelSums& sums, std::size_t sum, std::uint32_t pixel);
   /// Sets the features of the taps, then their light.
   void set_taps(const TileJob& job, std::span<const TileJob> margin);
   void set_light(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
                  const PixelSums& sums);
+  /// Finds where narrow lobes blur what they show.
+  void set_blur(const LightContext& context, const TileJob& job, std::span<const TileJob> margin);
+  /// Takes excess from the light of the taps; later shares it out among the pixels about.
+  void take_excess();
+  /// The sum of the weights of a window whose pixels are all alike, but those that the tile does not know.
+  [[nodiscard]] double window_sum(const TileJob& job, std::size_t at, int radius) const;
+  void share_excess(const LightContext& context, const TileJob& job, const PixelSums& sums);
   /// What the centers of pixels and of subpixel samples have in common.
   [[nodiscard]] static FilterCenter<float> center_of(const View& view, const SurfaceFeature& feature,
                                                      std::uint32_t pixel);
@@ -125,7 +145,8 @@ class Denoiser {
   std::vector<TapVectors<double>>
       diffuse_light_;  ///< the diffuse part of light_; when some pixel of the tile separates it
   std::vector<TapVectors<double>> kept_light_;         ///< the part of light_ that stays with its pixel: direct light
-  std::array<double, TapPlanes::kSize> brightness_{};  ///< of the current sample's pixels; 0 where there is none
+  std::array<double, TapPlanes::kSize> brightness_{};  ///< of the current sample's pixels; below 0: unknown
+  std::vector<Excess> excess_;                         ///< of the current sample
   bool some_separate_ = false;
   TapWeights<float> weights_;
   TapWeights<float> diffuse_weights_;

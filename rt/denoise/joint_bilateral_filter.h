@@ -29,6 +29,9 @@ struct TapPlanes {
   [[nodiscard]] static std::size_t index(int x, int y) {
     return static_cast<std::size_t>(y + kMargin) * kStride + static_cast<std::size_t>(x + kMargin);
   }
+  [[nodiscard]] static glm::ivec2 pixel_at(std::size_t i) {
+    return {static_cast<int>(i % kStride) - kMargin, static_cast<int>(i / kStride) - kMargin};
+  }
 };
 
 /// A vector for each tap of a tile.

@@ -52,6 +52,17 @@ Scene room() {
   return scene;
 }
 
+/// A room with a shiny floor, and a small lamp that few rays find.
+Scene lamp_room() {
+  Scene scene = room();
+  scene.materials[0].roughness = 0.1F;
+  scene.materials[0].ior = 1.5F;
+  const std::uint32_t lamp = add_material(scene, test::glowing(glm::vec3(1e4F)));
+  place_mesh(scene, add_mesh(scene, test::quad({0, 1.5F, -2.5F}, {0.3F, 0, 0}, {0, 0, 0.3F}, lamp)));
+  finish_scene(scene);
+  return scene;
+}
+
 std::size_t count_other_pixels(const Image<Rgb>& a, const Image<Rgb>& b) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < a.pixels().size(); ++i) count += a.pixels()[i] == b.pixels()[i] ? 0U : 1U;
@@ -78,6 +89,13 @@ TEST(TileMargin, DenoisedBlocksHaveNoSeams) {
   const View view = test::view_from({0.5, 2, -1}, {0.4, 0, -1.4}, kSize, scene);
   expect_no_seams(scene, view, {.passes = {PassId::Gather}, .max_depth = 4, .denoise = true}, 3);
   expect_no_seams(scene, view, {.passes = {PassId::Shadow}, .denoise = true}, 2);
+}
+
+/// Neither does what few samples find, which is shared out.
+TEST(TileMargin, RareLightHasNoSeams) {
+  const Scene scene = lamp_room();
+  const View view = test::view_from({0.5, 2, -1}, {0.4, 0, -1.4}, kSize, scene);
+  expect_no_seams(scene, view, {.passes = {PassId::Gather, PassId::Reflection}, .max_depth = 2, .denoise = true}, 2);
 }
 
 TEST(TileMargin, BlocksAtHalfResolutionHaveNoSeams) {
