@@ -117,6 +117,7 @@ void join_job_board(int rank) {
   if (mapped == MAP_FAILED) return;
   Slot& joined = static_cast<Slot*>(mapped)[slot];  // stays mapped: reports come to the end
   put(joined.host, host_name());
+  put(joined.phase, this_phase);
   joined.process.store(::getpid());
   reports = true;
   first.store(static_cast<Slot*>(mapped));

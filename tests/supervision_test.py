@@ -27,10 +27,10 @@ OF_LAUNCHERS = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM":
 class Run:
     """A wall that goes on until it is stopped, alone in its folder of sockets."""
 
-    def __init__(self, folder, name, *options, display="none"):
+    def __init__(self, folder, name, *options, display="none", environment=None):
         self.name, self.folder = name, folder / name
         self.folder.mkdir()
-        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder)}
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder), **(environment or {})}
         self.log = self.folder / "log"
         with open(self.log, "w", encoding="utf-8") as log:
             self.process = subprocess.Popen(
@@ -108,19 +108,21 @@ def lost_before_it_draws(folder):
 
 
 def lost_while_they_start(folder):
-    """Of a launcher that does not notice, and does not end when it is told to: Open MPI's, where a rank ends while they meet."""
+    """Of a launcher that does not notice, and ignores SIGTERM: so is Open MPI's, where a rank ends while it connects to it."""
+    again = folder / "again"  # from the second job on all is as it should be
     rank = folder / "waits-as-rank-1"
-    rank.write_text('#!/bin/sh\n[ "$OMPI_COMM_WORLD_RANK" = 1 ] && [ ! -e {0} ] && exec sleep 1000\nexec "$@"\n'.format(folder / "again"))
-    deaf = folder / "deaf-at-first"
-    deaf.write_text('#!/bin/sh\n[ -e {0} ] && exec mpiexec -n 2 {1} "$@"\ntrap "" TERM\nmpiexec -n 2 {1} "$@"\ntouch {0}\nexec sleep 1000\n'.format(folder / "again", rank))
-    for script in (rank, deaf):
+    rank.write_text(f'#!/bin/sh\n[ "$OMPI_COMM_WORLD_RANK" = 1 ] && [ ! -e {again} ] && exec sleep 1000\nexec "$@"\n')
+    launcher = folder / "goes-on-at-first"
+    launcher.write_text(f'#!/bin/sh\n[ -e {again} ] && exec mpiexec -n 2 {rank} "$@"\ntrap "" TERM\nmpiexec -n 2 {rank} "$@"\nexec sleep 1000\n')
+    for script in (rank, launcher):
         script.chmod(0o755)
-    os.environ.update(OF_LAUNCHERS)
-    run = Run(folder, "deaf", "--ranks", "2", "--launcher", str(deaf), "--hang-timeout", "10")
-    has_met = lambda pid: b"OMPI_COMM_WORLD_RANK=0\0" in words_of(pid, "environ") and b"hpr-job-board" in words_of(pid, "maps")
-    waiting = lambda: [pid for mpiexec in ranks_of(run.process.pid) for pid in children_of(mpiexec) if has_met(pid)]
-    if run.wait(waiting, "starts no rank 0"):
-        send(waiting()[0], signal.SIGKILL)
+    run = Run(folder, "unnoticed", "--ranks", "2", "--launcher", str(launcher), "--hang-timeout", "10", environment=OF_LAUNCHERS)
+    has_joined = lambda pid: b"OMPI_COMM_WORLD_RANK=0\0" in words_of(pid, "environ") and b"hpr-job-board" in words_of(pid, "maps")
+    joined = lambda: [pid for mpiexec in ranks_of(run.process.pid) for pid in children_of(mpiexec) if has_joined(pid)]
+    if run.wait(joined, "starts no rank 0"):
+        time.sleep(0.2)  # the board is written to soon after it is mapped
+        send(joined()[0], signal.SIGKILL)
+    again.touch()
     is_started_again(run, rf"a rank ended while 2 ranks started: rank 0 on {HOST}: start of MPI; starting it again")
 
 

@@ -489,8 +489,9 @@ class RunningJob {
     if (!end_requested_at_) check_ranks(now);
     if (!end_requested_at_ && (PassedSignals::ends() || output_error_ != 0)) end_requested_at_ = now;
     if (!end_requested_at_ && !mark_.has_output()) {
-      if (!lost_at_ && watch_.first_known_to_end()) lost_at_ = now;
-      // Open MPI notices most ranks that end, but not one that ends while it introduces itself.
+      // Open MPI notices most ranks that end, but not one that ends while it connects to mpiexec. Ranks that have
+      // waited for the others as long as they may end by themselves: late.
+      if (!lost_at_ && now - begin_ < hang_limit_ && watch_.first_known_to_end()) lost_at_ = now;
       lost_early_ = lost_at_ && now - *lost_at_ > end_limit_;
       late_ = !lost_early_ && now - begin_ > start_limit_;
       if (lost_early_ || late_) {

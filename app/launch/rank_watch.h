@@ -28,7 +28,8 @@ class RankWatch {
 
   /// Whether all ranks are on this host, and have come to start MPI.
   [[nodiscard]] bool knows_all() const;
-  /// A rank of this host that ended, one of another may have before it; else as first_to_end().
+  /// The rank of this host that ended first, and in doing what; a rank of another host may have ended before it. None:
+  /// no rank of this host is known to have ended.
   [[nodiscard]] std::optional<std::string> first_known_to_end() const;
   /// The rank that ended first and in doing what; where several had ended when it was noticed, all of those. None:
   /// none is known to have ended, or it may be one of another host.

@@ -83,8 +83,8 @@ void refuse_launcher_without_mpi() {
 ExitCode run_in_mpi_job(const Globals& globals, const std::function<ExitCode(Communicator&)>& body) {
   std::optional<CallLimit> limit;
   limit.emplace(globals.hang_limit(), "starting MPI");
-  join_job_board(launched_rank());
   report_phase("start of MPI");
+  join_job_board(launched_rank());
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);
   int rank = 0;

@@ -30,8 +30,11 @@ constexpr float kNeighbourSamples = 16.0F;
 constexpr double kFarBrighter = 3.0;
 /// Of what is beyond, pixels about share this multiple of the rest; more would show, and is left out.
 constexpr double kShared = 2.0;
-/// A lobe whose alpha is so many times the angle of a pixel blurs what it shows over the pixels about.
-constexpr double kBlurringAngles = 2.0;
+/// A lobe whose alpha is so many times the angle of a pixel blurs what it shows over the pixels about: it is four times
+/// as wide.
+constexpr double kBlurringAngles = 1.0;
+/// Below it a lobe shows points and lines.
+constexpr float kMinBlur = 0.25F;
 /// In place of the brightness of a pixel that the tile does not know.
 constexpr double kUnknown = -1.0;
 /// Bound of the ratio of scattered fractions, either way.
@@ -69,6 +72,33 @@ bool is_on_screen(const TileJob& job, std::size_t at) {
   const glm::ivec2 pixel = job.origin() + TapPlanes::pixel_at(at);
   const Size& screen = job.view->screen;
   return std::min(pixel.x, pixel.y) >= 0 && pixel.x < screen.width && pixel.y < screen.height;
+}
+
+/// Whether a surface is so flat that what a lobe of that alpha shows beside it is the same, but for the blur.
+bool is_flat(const NeighborFeatures<float>& taps, std::size_t at, float alpha) {
+  for (const std::size_t step : {std::size_t{1}, std::size_t{TapPlanes::kStride}}) {
+    bool has_neighbor = false;
+    for (const std::size_t about : {at - step, at + step}) {
+      if (taps.kinds.at(about) != taps.kinds.at(at)) continue;
+      has_neighbor = true;
+      const glm::vec3 turned = taps.shading_normal.at(about) - taps.shading_normal.at(at);
+      if (glm::dot(turned, turned) > square(alpha)) return false;
+    }
+    if (!has_neighbor) return false;
+  }
+  return true;
+}
+
+/// The least of a tap and of those about it that show the like.
+float least_about(const NeighborFeatures<float>& taps, const std::array<float, TapPlanes::kSize>& values,
+                  std::size_t at) {
+  float least = values.at(at);
+  for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
+    for (const std::size_t about : {row - 1, row, row + 1}) {
+      if (taps.kinds.at(about) == taps.kinds.at(at)) least = std::min(least, values.at(about));
+    }
+  }
+  return least;
 }
 
 /// Sum i, see Denoiser::each_sum.
@@ -191,20 +221,21 @@ void Denoiser::set_taps(const TileJob& job, std::span<const TileJob> margin) {
   });
 }
 
-void Denoiser::set_blur(const LightContext& context, const TileJob& job, std::span<const TileJob> margin) {
-  const NeighborFeatures<float>& taps = *taps_;
-  // Parallel rays see all of a plane from one side.
-  const auto blurring =
-      static_cast<float>(context.view->orthographic ? 0.0 : kBlurringAngles * footprint_of(*context.view).metres);
+void Denoiser::set_blur(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
+                        const PixelSums& sums) {
+  const PixelFootprint footprint = footprint_of(*context.view);
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
-    if (states_[own] != State::Tap) return;
+    if (states_[own] == State::Tap) distance_.at(at) = sums.distance[own];
+  });
+  each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
     PixelFeature& seen = pixel_features_[own];
-    if (seen.alpha == 0.0F || seen.width == 1.0F) return;
-    for (const std::size_t about : {at - TapPlanes::kStride, at - 1, at + 1, at + TapPlanes::kStride}) {
-      const glm::vec3 turned = taps.shading_normal.at(about) - seen.shading_normal;
-      if (taps.kinds.at(about) == taps.kinds.at(at) && glm::dot(turned, turned) > square(seen.alpha)) return;
-    }
-    seen.blur = seen.alpha > blurring ? 1.0F : seen.alpha / blurring;
+    if (states_[own] != State::Tap || seen.alpha == 0.0F || seen.width == 1.0F || !is_flat(*taps_, at, seen.alpha))
+      return;
+    // The angle that a pixel of what the surface shows takes of the lobe.
+    const auto distance = static_cast<double>(least_about(*taps_, distance_, at));
+    const auto to_eye = static_cast<double>(glm::length(seen.feature.position));
+    const double angle = footprint.metres * (footprint.orthographic ? 1.0 / distance : 1.0 + to_eye / distance);
+    seen.blur = static_cast<float>(std::min(1.0, static_cast<double>(seen.alpha) / (kBlurringAngles * angle)));
   });
 }
 
@@ -275,6 +306,27 @@ double Denoiser::sky_light(const LightContext& context, const PixelFeature& seen
          std::numbers::inv_pi;
 }
 
+Denoiser::Surroundings Denoiser::surroundings_of(const TileJob& job, std::size_t at) const {
+  const NeighborFeatures<float>& taps = *taps_;
+  const TapVectors<float>& scattering = taps.scattering[static_cast<std::size_t>(FilterLobe::All)];
+  Surroundings found;
+  for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
+    for (const std::size_t about : {row - 1, row, row + 1}) {
+      if (about == at) continue;
+      const double light = brightness_.at(about);
+      if (light == kUnknown) {
+        found.is_known = found.is_known && !is_within(job, about, 0);
+        continue;
+      }
+      found.brightest = std::max(found.brightest, light);
+      const double scattered = brightness(glm::dvec3(scattering.at(about)));
+      if (taps.kinds.at(about) == taps.kinds.at(at) && scattered > 0.0)
+        found.irradiance = std::max(found.irradiance, light / scattered);
+    }
+  }
+  return found;
+}
+
 void Denoiser::set_apart(const LightContext& context, const PixelSums& sums, const TileJob& job,
                          std::span<const TileJob> margin) {
   excess_.clear();
@@ -286,31 +338,29 @@ void Denoiser::set_apart(const LightContext& context, const PixelSums& sums, con
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
     if (states_[own] == State::Unlit) return;
     const glm::dvec3& light = sums.radiance[own];
-    double brightest = 0.0;  // of the pixels about
-    for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
-      for (const std::size_t about : {row - 1, row, row + 1}) {
-        if (about != at) brightest = std::max(brightest, brightness_.at(about));
-      }
-    }
     if (!fits_floats(light)) states_[own] = State::Apart;
     if (states_[own] != State::Tap) return;
     const PixelFeature& seen = pixel_features_[own];
-    const double expected = std::max(kFarBrighter * brightest, sky_light(context, seen));
-    if (!(brightness(light) > expected)) return;
-    if (seen.width < 1.0F && seen.blur == 0.0F) {  // what it mirrors may have lines and points
+    const double sky = sky_light(context, seen);
+    const Surroundings about = surroundings_of(job, at);
+    if (!(brightness(light) > std::max(kFarBrighter * about.brightest, sky))) return;
+    // What it shows may have lines and points, or nothing says how bright it should be.
+    const bool shows_detail = seen.width < 1.0F && seen.blur < kMinBlur;
+    if (shows_detail || !about.is_known || about.irradiance == 0.0) {
       states_[own] = State::Apart;
       return;
     }
+    const double scattered = brightness(glm::dvec3(scattering_of(seen, FilterLobe::All)));
+    const double expected = std::max(kFarBrighter * about.irradiance * scattered, sky);
     const double filtered = brightness(keeps(context, 0) ? light - kept_light(sums, 0, own) : light);
-    if (filtered > expected) {
-      const double beyond = 1.0 - expected / filtered;
-      excess_.push_back({own, at, beyond, std::min(beyond, kShared * expected / filtered)});
-    }
+    if (!(filtered > expected)) return;
+    const double beyond = 1.0 - expected / filtered;
+    excess_.push_back({own, at, beyond, std::min(beyond, kShared * expected / filtered)});
   });
   std::ranges::sort(excess_, {}, &Excess::at);  // row by row, wherever tiles end
 }
 
-void Denoiser::take_excess() {
+void Denoiser::take_excess(const LightContext& context) {
   for (const Excess& excess : excess_) {
     if (states_[excess.pixel] != State::Tap) continue;
     const auto scale = [&](TapVectors<double>& light, const glm::dvec3& kept) {
@@ -318,7 +368,7 @@ void Denoiser::take_excess() {
       light.set(excess.at, all - excess.fraction * (all - kept));
     };
     each_sum([&](std::size_t i) {
-      scale(light_[i], i < kept_light_.size() ? kept_light_[i].at(excess.at) : glm::dvec3(0.0));
+      scale(light_[i], keeps(context, i) ? kept_light_[i].at(excess.at) : glm::dvec3(0.0));
       if (some_separate_) scale(diffuse_light_[i], glm::dvec3(0.0));
     });
   }
@@ -337,6 +387,17 @@ double Denoiser::window_sum(const TileJob& job, std::size_t at, int radius) cons
   return sum;
 }
 
+/// By how much more of the light a tap scatters than the center of the term.
+glm::dvec3 Denoiser::scattering_ratio(std::size_t tap, const ScatteringTerm<float>& term) const {
+  const glm::dvec3 theirs(taps_->scattering[term.plane].at(tap));
+  const glm::dvec3 own(term.own);
+  glm::dvec3 ratio(1.0);
+  for (int i = 0; i < 3; ++i) {
+    if (own[i] != theirs[i]) ratio[i] = theirs[i] / own[i];
+  }
+  return ratio;
+}
+
 void Denoiser::share_excess(const LightContext& context, const TileJob& job, const PixelSums& sums) {
   const int radius = reach(job.number.sample) - 1;
   for (const Excess& excess : excess_) {
@@ -347,10 +408,12 @@ void Denoiser::share_excess(const LightContext& context, const TileJob& job, con
     center.separate_diffuse = seen.separate_diffuse;
     center.normal = seen.shading_normal;
     center.sharpness = sharpness_of(narrowed_ * seen.width);
+    center.terms[0] = {static_cast<std::size_t>(FilterLobe::All), scattering_of(seen, FilterLobe::All)};
+    center.term_count = 1;
     center.window = window_about(center.pixel, center.offset, radius);
     center.reach = static_cast<float>(radius) + 1.0F;
     joint_bilateral_weights(*taps_, center, weights_);
-    const auto add = [&](const glm::ivec2& to, double fraction) {
+    const auto add = [&](const glm::ivec2& to, const glm::dvec3& fraction) {
       if (to.x < 0 || to.y < 0 || to.x >= job.rect.width() || to.y >= job.rect.height()) return;
       const auto pixel = static_cast<std::uint32_t>(index_of(to.x, to.y));
       if (!job.wants(pixel)) return;
@@ -367,12 +430,14 @@ void Denoiser::share_excess(const LightContext& context, const TileJob& job, con
         const float weight = weights_.terms[0].red.at(static_cast<std::size_t>(y) * TapWeights<float>::kPlaces +
                                                       static_cast<std::size_t>(x));
         if (weight == 0.0F) continue;
-        const double fraction = static_cast<double>(weight) / whole;
+        const glm::ivec2 to = center.window.first + glm::ivec2(x, y);
+        const glm::dvec3 tint = scattering_ratio(TapPlanes::index(to.x, to.y), center.terms[0]);
+        const double fraction = static_cast<double>(weight) * tint.x / whole;  // the filter lends the other way round
         left -= fraction;
-        add(center.window.first + glm::ivec2(x, y), fraction);
+        add(to, fraction * tint);
       }
     }
-    add(center.pixel, left);  // with what no pixel about takes
+    add(center.pixel, glm::dvec3(left));  // with what no pixel about takes
   }
 }
 
@@ -395,7 +460,7 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, s
                               const TileFragments& fragments, RayBuffers& buffers, PixelSums& sums,
                               std::vector<PathVertex>& unfiltered) {
   set_taps(job, margin);
-  set_blur(context, job, margin);
+  set_blur(context, job, margin, sums);
   set_apart(context, sums, job, margin);
   each_sum([&](std::size_t i) {
     filtered_.at(i).assign(kTilePixels, glm::dvec3(0.0));
@@ -408,7 +473,7 @@ void Denoiser::resample_edges(const LightContext& context, const TileJob& job, s
     if (states_[own] == State::Apart) taps_->kinds.at(at) = NeighborFeatures<float>::kNoTap;
   });
   set_light(context, job, margin, sums);
-  take_excess();
+  take_excess(context);
   View view = unjittered(job);
   buffers.requests.clear();
   samples_.clear();

@@ -74,7 +74,15 @@ class Denoiser {
     float width = 1.0F;        ///< how far normals may differ, relative to those of rough surfaces
     bool separate_diffuse = false;  ///< `width` holds for specular light only, and diffuse light is known
     float alpha = 1.0F;             ///< of the smoothest lobe; 0: a mirror
-    float blur = 0.0F;  ///< 1: this lobe blurs what it shows over the pixels about; only where the surface is flat
+    /// 1: this lobe blurs what it shows over the pixels about; less: over so much of one. 0 where the surface turns.
+    float blur = 0.0F;
+  };
+
+  /// The light of the 8 pixels about one, by its brightest channel.
+  struct Surroundings {
+    double brightest = 0.0;
+    double irradiance = 0.0;  ///< the brightest of those that show the like, over the fraction they scatter; 0: none
+    bool is_known = true;     ///< whether all in the tile are lit
   };
 
   /// Rare light that few samples have found yet: beyond what the pixels about have.
@@ -97,6 +105,7 @@ class Denoiser {
   /// Calls `body` with each pixel of the tile and then of its margin: its index into PixelSums, and that of its planes.
   template <typename Body>
   static void each_pixel(const TileJob& job, std::span<const TileJob> margin, const Body& body);
+  [[nodiscard]] Surroundings surroundings_of(const TileJob& job, std::size_t at) const;
   /// Finds pixels that stay apart, and excess.
   void set_apart(const LightContext& context, const PixelSums& sums, const TileJob& job,
                  std::span<const TileJob> margin);
@@ -110,11 +119,13 @@ class Denoiser {
   void set_light(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
                  const PixelSums& sums);
   /// Finds where narrow lobes blur what they show.
-  void set_blur(const LightContext& context, const TileJob& job, std::span<const TileJob> margin);
+  void set_blur(const LightContext& context, const TileJob& job, std::span<const TileJob> margin,
+                const PixelSums& sums);
   /// Takes excess from the light of the taps; later shares it out among the pixels about.
-  void take_excess();
+  void take_excess(const LightContext& context);
   /// The sum of the weights of a window whose pixels are all alike, but those that the tile does not know.
   [[nodiscard]] double window_sum(const TileJob& job, std::size_t at, int radius) const;
+  [[nodiscard]] glm::dvec3 scattering_ratio(std::size_t tap, const ScatteringTerm<float>& term) const;
   void share_excess(const LightContext& context, const TileJob& job, const PixelSums& sums);
   /// What the centers of pixels and of subpixel samples have in common.
   [[nodiscard]] static FilterCenter<float> center_of(const View& view, const SurfaceFeature& feature,
@@ -146,6 +157,7 @@ class Denoiser {
       diffuse_light_;  ///< the diffuse part of light_; when some pixel of the tile separates it
   std::vector<TapVectors<double>> kept_light_;         ///< the part of light_ that stays with its pixel: direct light
   std::array<double, TapPlanes::kSize> brightness_{};  ///< of the current sample's pixels; below 0: unknown
+  std::array<float, TapPlanes::kSize> distance_{};     ///< of the current sample's taps, see PixelSums
   std::vector<Excess> excess_;                         ///< of the current sample
   bool some_separate_ = false;
   TapWeights<float> weights_;

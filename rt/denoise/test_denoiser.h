@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -47,6 +48,23 @@ inline double squared_error(const Image<Rgb>& image, const Image<Rgb>& truth) {
     sum += std::pow(static_cast<double>(image.pixels()[i].g - truth.pixels()[i].g), 2.0);
   }
   return sum / static_cast<double>(image.pixels().size());
+}
+
+/// Pixels over so many times as bright as all about them.
+inline std::size_t count_salt(const Image<Rgb>& image, float times = 3.0F) {
+  std::size_t count = 0;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      float brightest = 0.0F;
+      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, image.height() - 1); ++v) {
+        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, image.width() - 1); ++u) {
+          if (u != x || v != y) brightest = std::max(brightest, image.at(u, v).g);
+        }
+      }
+      if (image.at(x, y).g > times * brightest) ++count;
+    }
+  }
+  return count;
 }
 
 inline const RaySettings kGathered{.passes = {PassId::Gather}, .max_depth = 4};

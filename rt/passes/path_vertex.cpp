@@ -486,6 +486,9 @@ void LobeRays::finish(const PassInfo& pass, std::vector<PathVertex>& next) {
     add_sky(context_, buffers_, i, pass, sums_);
     if (buffers_.lobe_hits[i] == kNoSurface) continue;
     make_vertex(context_, buffers_, i, pass, next.emplace_back());
+    const PathVertex& reached = next.back();
+    if (reached.depth == 1 && !pass.gathers_all_lobes)
+      sums_.note_distance(reached.pixel, glm::distance(reached.surface.position, reached.previous_position));
     prefetch_material(context_.scene, next.back().surface);
   }
   ++finished_;

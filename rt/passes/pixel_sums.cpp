@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <type_traits>
 
@@ -83,6 +84,7 @@ void PixelSums::clear(const TileJob& job, std::size_t tile, std::span<const Shad
     clear_sums(components.at(i), pixels, margins, wanted);
     if (wants_diffuse) clear_sums(diffuse_components.at(i), pixels, margins, wanted);
   }
+  if (wants_diffuse) distance.assign(pixels + margins, std::numeric_limits<float>::infinity());
   if (wants_cost) cost.assign(pixels + margins, 0.0F);
   if (wants_coverage) clear_sums(uncovered, pixels, margins, wanted);
   for (const ShadedSample& sample : samples) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +18,7 @@ struct TileJob;
 /// What is summed beside what the samples want.
 struct WantedSums {
   bool all_components = false;  ///< those that no sample wants too
-  /// The diffuse part of each, and room for one more sample behind those given (a denoiser's).
+  /// What a denoiser needs: the diffuse part of each, distances, and room for one more sample behind those given.
   bool diffuse = false;
   bool cost = false;        ///< the rays of each pixel
   std::size_t margins = 0;  ///< strips, which have the sums of a tile each, behind all others
@@ -49,6 +50,10 @@ class PixelSums {
     add_to_component(pixel, Component::Direct, light, true);
     add_to_component(pixel, Component::Shadow, -light, true);
   }
+  /// Notes how many metres from the pixel's first surface a lobe that is followed for itself found something.
+  void note_distance(std::uint32_t pixel, double metres) {
+    if (wants_diffuse) distance[pixel] = std::min(distance[pixel], static_cast<float>(metres));
+  }
   /// Counts a ray that was traced for a pixel.
   void count_ray(std::uint32_t pixel) {
     if (wants_cost) cost[pixel] += 1.0F;
@@ -71,6 +76,7 @@ class PixelSums {
   std::vector<glm::dvec3> diffuse;
   std::array<std::vector<glm::dvec3>, kComponents> diffuse_components;
   std::vector<float> cost;        ///< rays traced
+  std::vector<float> distance;    ///< the least that was noted; infinite: none
   std::vector<double> uncovered;  ///< fraction of the pixel that shows the background
 
  private:
