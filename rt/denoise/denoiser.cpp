@@ -398,6 +398,18 @@ glm::dvec3 Denoiser::scattering_ratio(std::size_t tap, const ScatteringTerm<floa
   return ratio;
 }
 
+void Denoiser::add_share(const LightContext& context, const TileJob& job, const PixelSums& sums, const Excess& excess,
+                         const glm::ivec2& to, const glm::dvec3& fraction) {
+  if (to.x < 0 || to.y < 0 || to.x >= job.rect.width() || to.y >= job.rect.height()) return;
+  const auto pixel = static_cast<std::uint32_t>(index_of(to.x, to.y));
+  if (!job.wants(pixel)) return;
+  each_sum([&](std::size_t i) {
+    glm::dvec3 light = sum_of(sums, i)[excess.pixel];
+    if (keeps(context, i)) light -= kept_light(sums, i, excess.pixel);
+    filtered_.at(i)[pixel] += excess.shared * fraction * light;
+  });
+}
+
 void Denoiser::share_excess(const LightContext& context, const TileJob& job, const PixelSums& sums) {
   const int radius = reach(job.number.sample) - 1;
   for (const Excess& excess : excess_) {
@@ -413,16 +425,6 @@ void Denoiser::share_excess(const LightContext& context, const TileJob& job, con
     center.window = window_about(center.pixel, center.offset, radius);
     center.reach = static_cast<float>(radius) + 1.0F;
     joint_bilateral_weights(*taps_, center, weights_);
-    const auto add = [&](const glm::ivec2& to, const glm::dvec3& fraction) {
-      if (to.x < 0 || to.y < 0 || to.x >= job.rect.width() || to.y >= job.rect.height()) return;
-      const auto pixel = static_cast<std::uint32_t>(index_of(to.x, to.y));
-      if (!job.wants(pixel)) return;
-      each_sum([&](std::size_t i) {
-        glm::dvec3 light = sum_of(sums, i)[excess.pixel];
-        if (keeps(context, i)) light -= kept_light(sums, i, excess.pixel);
-        filtered_.at(i)[pixel] += excess.shared * fraction * light;
-      });
-    };
     const double whole = window_sum(job, excess.at, radius);
     double left = 1.0;
     for (int y = 0; y < static_cast<int>(weights_.rows); ++y) {
@@ -434,10 +436,10 @@ void Denoiser::share_excess(const LightContext& context, const TileJob& job, con
         const glm::dvec3 tint = scattering_ratio(TapPlanes::index(to.x, to.y), center.terms[0]);
         const double fraction = static_cast<double>(weight) * tint.x / whole;  // the filter lends the other way round
         left -= fraction;
-        add(to, fraction * tint);
+        add_share(context, job, sums, excess, to, fraction * tint);
       }
     }
-    add(center.pixel, glm::dvec3(left));  // with what no pixel about takes
+    add_share(context, job, sums, excess, center.pixel, glm::dvec3(left));  // with what no pixel about takes
   }
 }
 

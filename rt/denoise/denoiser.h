@@ -126,6 +126,8 @@ class Denoiser {
   /// The sum of the weights of a window whose pixels are all alike, but those that the tile does not know.
   [[nodiscard]] double window_sum(const TileJob& job, std::size_t at, int radius) const;
   [[nodiscard]] glm::dvec3 scattering_ratio(std::size_t tap, const ScatteringTerm<float>& term) const;
+  void add_share(const LightContext& context, const TileJob& job, const PixelSums& sums, const Excess& excess,
+                 const glm::ivec2& to, const glm::dvec3& fraction);
   void share_excess(const LightContext& context, const TileJob& job, const PixelSums& sums);
   /// What the centers of pixels and of subpixel samples have in common.
   [[nodiscard]] static FilterCenter<float> center_of(const View& view, const SurfaceFeature& feature,
