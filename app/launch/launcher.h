@@ -63,9 +63,8 @@ void notify_launcher();
 /// `options.hang_limit`, 10 s and half a second a rank is ended; one that does not end after SIGTERM, in as long as
 /// that limit but at least 2 and at most 10 s, is killed; and one that goes on for so long after a rank has ended
 /// before all had started is ended. Throws Error: Io when mpiexec or MPI cannot be started; Lost when a rank or mpiexec
-/// itself was killed; Hang when mpiexec was stopped, or no rank of this host has got on, for
-/// longer than the ranks report as their limit (core/job_board.h). Throws
-/// Interrupted.
+/// itself was killed; Hang when mpiexec was stopped, or no rank of this host has got on, for longer than the ranks
+/// report as their limit (core/job_board.h). Throws Interrupted.
 int run_job(int ranks, const std::vector<std::string>& args, const JobOptions& options = {});
 
 /// The first executable file of this name on the PATH.

@@ -61,11 +61,8 @@ std::size_t plane_index(std::uint32_t pixel) {
   return TapPlanes::index(static_cast<int>(pixel) % kTileSide, static_cast<int>(pixel) / kTileSide);
 }
 
-/// Whether a pixel lies in the tile or so near to it. `at`: an index of planes.
-bool is_within(const TileJob& job, std::size_t at, int pixels) {
-  const glm::ivec2 pixel = TapPlanes::pixel_at(at);
-  return std::min(pixel.x, pixel.y) >= -pixels && pixel.x < job.rect.width() + pixels &&
-         pixel.y < job.rect.height() + pixels;
+bool is_in_tile(const TileJob& job, const glm::ivec2& pixel) {
+  return std::min(pixel.x, pixel.y) >= 0 && pixel.x < job.rect.width() && pixel.y < job.rect.height();
 }
 
 bool is_on_screen(const TileJob& job, std::size_t at) {
@@ -89,15 +86,23 @@ bool is_flat(const NeighborFeatures<float>& taps, std::size_t at, float alpha) {
   return true;
 }
 
+/// Calls `body` with the 8 pixels about one, indices of planes.
+template <typename Body>
+void each_about(std::size_t at, const Body& body) {
+  for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
+    for (const std::size_t about : {row - 1, row, row + 1}) {
+      if (about != at) body(about);
+    }
+  }
+}
+
 /// The least of a tap and of those about it that show the like.
 float least_about(const NeighborFeatures<float>& taps, const std::array<float, TapPlanes::kSize>& values,
                   std::size_t at) {
   float least = values.at(at);
-  for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
-    for (const std::size_t about : {row - 1, row, row + 1}) {
-      if (taps.kinds.at(about) == taps.kinds.at(at)) least = std::min(least, values.at(about));
-    }
-  }
+  each_about(at, [&](std::size_t about) {
+    if (taps.kinds.at(about) == taps.kinds.at(at)) least = std::min(least, values.at(about));
+  });
   return least;
 }
 
@@ -310,20 +315,17 @@ Denoiser::Surroundings Denoiser::surroundings_of(const TileJob& job, std::size_t
   const NeighborFeatures<float>& taps = *taps_;
   const TapVectors<float>& scattering = taps.scattering[static_cast<std::size_t>(FilterLobe::All)];
   Surroundings found;
-  for (const std::size_t row : {at - TapPlanes::kStride, at, at + TapPlanes::kStride}) {
-    for (const std::size_t about : {row - 1, row, row + 1}) {
-      if (about == at) continue;
-      const double light = brightness_.at(about);
-      if (light == kUnknown) {
-        found.is_known = found.is_known && !is_within(job, about, 0);
-        continue;
-      }
-      found.brightest = std::max(found.brightest, light);
-      const double scattered = brightness(glm::dvec3(scattering.at(about)));
-      if (taps.kinds.at(about) == taps.kinds.at(at) && scattered > 0.0)
-        found.irradiance = std::max(found.irradiance, light / scattered);
+  each_about(at, [&](std::size_t about) {
+    const double light = brightness_.at(about);
+    if (light == kUnknown) {
+      found.is_known = found.is_known && !is_in_tile(job, TapPlanes::pixel_at(about));
+      return;
     }
-  }
+    found.brightest = std::max(found.brightest, light);
+    const double scattered = brightness(glm::dvec3(scattering.at(about)));
+    if (taps.kinds.at(about) == taps.kinds.at(at) && scattered > 0.0)
+      found.irradiance = std::max(found.irradiance, light / scattered);
+  });
   return found;
 }
 
@@ -332,7 +334,7 @@ void Denoiser::set_apart(const LightContext& context, const PixelSums& sums, con
   excess_.clear();
   brightness_.fill(kUnknown);
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
-    const bool is_lit = own >= spare_ || (is_within(job, at, 0) && job.wants(own - job.first_pixel));
+    const bool is_lit = own >= spare_ || (is_in_tile(job, TapPlanes::pixel_at(at)) && job.wants(own - job.first_pixel));
     if (is_lit) brightness_.at(at) = brightness(sums.radiance[own]);
   });
   each_pixel(job, margin, [&](std::uint32_t own, std::size_t at) {
@@ -375,7 +377,7 @@ void Denoiser::take_excess(const LightContext& context) {
 }
 
 double Denoiser::window_sum(const TileJob& job, std::size_t at, int radius) const {
-  const bool is_own = is_within(job, at, 0);
+  const bool is_own = is_in_tile(job, TapPlanes::pixel_at(at));
   double sum = 0.0;
   for (int y = -radius; y <= radius; ++y) {
     for (int x = -radius; x <= radius; ++x) {
@@ -400,7 +402,7 @@ glm::dvec3 Denoiser::scattering_ratio(std::size_t tap, const ScatteringTerm<floa
 
 void Denoiser::add_share(const LightContext& context, const TileJob& job, const PixelSums& sums, const Excess& excess,
                          const glm::ivec2& to, const glm::dvec3& fraction) {
-  if (to.x < 0 || to.y < 0 || to.x >= job.rect.width() || to.y >= job.rect.height()) return;
+  if (!is_in_tile(job, to)) return;
   const auto pixel = static_cast<std::uint32_t>(index_of(to.x, to.y));
   if (!job.wants(pixel)) return;
   each_sum([&](std::size_t i) {

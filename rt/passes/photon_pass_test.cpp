@@ -10,8 +10,7 @@
 #include "cluster/transport/local_communicator.h"
 #include "core/error.h"
 #include "rt/deferred_shader.h"
-#include "rt/photons/photon_tracer.h"
-#include "rt/test_scene.h"
+#include "rt/photons/test_photons.h"
 
 namespace hpr {
 namespace {
@@ -39,6 +38,17 @@ Scene furnace(float albedo, float emission, float size = 1.0F) {
   finish_scene(scene);
   return scene;
 }
+
+/// A furnace with all that its photons need.
+struct LitFurnace : test::PhotonRoom {
+  LitFurnace() : PhotonRoom(furnace(0.5F, 1.0F)), lights(scene) {}
+
+  [[nodiscard]] PhotonMapBuilder builder(const RaySettings& settings, PhotonUse use = PhotonUse::Direct) const {
+    return PhotonMapBuilder(scene, surfaces, space, rays, lights, settings, use);
+  }
+
+  LightSampler lights;
+};
 
 class PhotonFurnace : public testing::TestWithParam<double> {};
 
@@ -93,13 +103,9 @@ TEST(PhotonPass, RanksOfAHostShareItsMemory) {
 }
 
 TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
-  const Scene scene = furnace(0.5F, 1.0F);
-  const RaySpace space(scene);
-  const Surfaces surfaces(scene, space);
-  const RayScene rays(scene, space, 1);
-  const LightSampler lights(scene);
+  const LitFurnace furnace;
   RaySettings settings{.photons = 40'000, .global_photons = true};
-  PhotonMapBuilder whole(scene, surfaces, space, rays, lights, settings);
+  PhotonMapBuilder whole = furnace.builder(settings);
   const auto kept = static_cast<double>(whole.build({}, nullptr).global.size());
   // As much memory as holds three quarters of them: all ranks get all.
   const double memory = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
@@ -107,7 +113,7 @@ TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
   for (const int ranks : {1, 2}) {
     EXPECT_THROW(run_local_ranks(ranks,
                                  [&](Communicator& comm) {
-                                   PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings);
+                                   PhotonMapBuilder builder = furnace.builder(settings);
                                    (void)builder.build({}, &comm);
                                  }),
                  Error)
@@ -116,15 +122,11 @@ TEST(PhotonPass, EveryRankKeepsItsShareOfWhatItsMemoryHolds) {
 }
 
 TEST(PhotonPass, RadiiAndNumbersFollowWhatAPixelCovers) {
-  const Scene scene = furnace(0.5F, 1.0F);  // every photon is kept twice in the mean, on 24 square metres
-  const RaySpace space(scene);
-  const Surfaces surfaces(scene, space);
-  const RayScene rays(scene, space, 1);
-  const LightSampler lights(scene);
+  const LitFurnace furnace;  // every photon is kept twice in the mean, on 24 square metres
   const auto map_of = [&](double footprint, bool fits, Communicator* comm = nullptr) {
     const RaySettings settings{
         .photons = 100'000, .global_photons = true, .photon_footprint = footprint, .fits_photons = fits};
-    PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings);
+    PhotonMapBuilder builder = furnace.builder(settings);
     const PhotonMap& map = builder.build({}, comm).global;
     return std::pair(map.radius(), static_cast<double>(map.size()));
   };
@@ -145,14 +147,10 @@ TEST(PhotonPass, RadiiAndNumbersFollowWhatAPixelCovers) {
 }
 
 TEST(PhotonPass, GatheredPhotonsAreSparseByTheFirstSamplesRadiusAndLookedUpByTheirOwn) {
-  const Scene scene = furnace(0.5F, 1.0F);
-  const RaySpace space(scene);
-  const Surfaces surfaces(scene, space);
-  const RayScene rays(scene, space, 1);
-  const LightSampler lights(scene);
+  const LitFurnace furnace;
   const auto check = [&](std::uint32_t photons, PhotonUse use, auto&& of_maps) {
     const RaySettings settings{.photons = photons, .global_photons = true, .photon_footprint = 0.01};
-    PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings, use);
+    PhotonMapBuilder builder = furnace.builder(settings, use);
     double first = 0.0;
     for (const std::uint32_t sample : {0U, 60U}) {
       const PhotonMaps& maps = builder.build({.sample = sample}, nullptr);
@@ -179,11 +177,7 @@ TEST(PhotonPass, GatheredPhotonsAreSparseByTheFirstSamplesRadiusAndLookedUpByThe
 }
 
 TEST(PhotonPass, PhotonsOvertakenOnAnyRankAreDroppedOnAllAndTracedAgainWithTheSameBits) {
-  const Scene scene = furnace(0.5F, 1.0F);
-  const RaySpace space(scene);
-  const Surfaces surfaces(scene, space);
-  const RayScene rays(scene, space, 1);
-  const LightSampler lights(scene);
+  const LitFurnace furnace;
   const SampleNumber number{.frame = 0, .sample = 2};
   const auto lights_of = [](const PhotonMap& map) {
     std::vector<std::array<float, 3>> fluxes;
@@ -193,14 +187,14 @@ TEST(PhotonPass, PhotonsOvertakenOnAnyRankAreDroppedOnAllAndTracedAgainWithTheSa
   for (const bool fits : {false, true}) {
     const RaySettings settings{
         .photons = 60'000, .global_photons = true, .photon_footprint = fits ? 0.004 : 0.0, .fits_photons = fits};
-    PhotonMapBuilder undisturbed(scene, surfaces, space, rays, lights, settings);
+    PhotonMapBuilder undisturbed = furnace.builder(settings);
     const auto expected = lights_of(undisturbed.build(number, nullptr).global);
     for (const int ranks : {1, 3}) {
       const int raised_on = ranks - 1;
       // In the pilot, if there is one, the photons that radii are chosen by, and the sample's own.
       for (const int raised_at : {1, 6, 11}) {
         run_local_ranks(ranks, [&](Communicator& comm) {
-          PhotonMapBuilder builder(scene, surfaces, space, rays, lights, settings);
+          PhotonMapBuilder builder = furnace.builder(settings);
           int polls = 0;
           EXPECT_FALSE(builder.build_while_wanted(number, comm,
                                                   [&] { return ++polls >= raised_at && comm.rank() == raised_on; }));
