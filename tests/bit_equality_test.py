@@ -111,7 +111,7 @@ def differing(way, runs, folder):
 def main():
     with tempfile.TemporaryDirectory(prefix="hpr-bits-") as scratch:
         folder = pathlib.Path(scratch)
-        ranks, threads = ("1", "2", "3", "4", "5", "7", "8") if FULL else ("1", "2", "5", "8"), ("1", "2")
+        ranks, threads = ("1", "2", "3", "4", "5", "7", "8") if FULL else ("1", "3", "8"), ("1", "2")
         distributions, backends = choices_of("--distribute", folder), usable_backends(folder)
         strategies, balances = choices_of("--strategy", folder), choices_of("--balance", folder)
         parts = ("sort-last --data partitioned", "hybrid --data partitioned")

@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -78,7 +79,7 @@ def announced(folder):
         until = time.monotonic() + 60
         while run.poll() is None and time.monotonic() < until:
             processes = ranks_of(run.pid) if "--ranks" in arguments else [run.pid]
-            if processes and all(map(has_begun, processes)):
+            if processes and all(has_begun(process) or catches(process, number) for process in processes):
                 break
             time.sleep(0.02)
         time.sleep(1)
@@ -192,6 +193,12 @@ def has_begun(pid):
         return len(list(pathlib.Path(f"/proc/{pid}/task").iterdir())) > 1
     except OSError:
         return False
+
+
+def catches(pid, number):
+    """Whether a process has a handler for a signal."""
+    caught = re.search(rb"^SigCgt:\s*([0-9a-f]+)", words_of(pid, "status"), re.MULTILINE)
+    return bool(caught) and bool(int(caught[1], 16) >> (number - 1) & 1)
 
 
 def asked_in_vain(folder):
