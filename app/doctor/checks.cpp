@@ -32,6 +32,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/timing.h"
+#include "gpu/gpu_device.h"
 #include "image/image_io.h"
 #include "raster/gl_context.h"
 #include "rt/trace/embree_compat.h"
@@ -252,6 +253,25 @@ Finding try_backend(const std::string& backend) {
   }
 }
 
+/// One finding for all: hpr draws without any.
+Finding list_gpus() {
+  try {
+    std::string list;
+    bool computes = false;
+    for (const GpuInfo& gpu : find_gpus()) {
+      computes = computes || gpu.lacks.empty();
+      list += fmt::format("{}{}: {}, {}, {}{}", list.empty() ? "" : "; ", gpu.index, gpu.name, gpu.driver,
+                          format_bytes(gpu.memory), gpu.software ? " (software)" : "");
+      if (!gpu.lacks.empty()) list += fmt::format(" (lacks {})", gpu.lacks);
+    }
+    if (!computes)
+      return warn(list.empty() ? "no device" : list, "install the driver of the GPU, or mesa-vulkan-drivers");
+    return ok(list);
+  } catch (const Error& error) {
+    return warn(error.what(), error.hint());
+  }
+}
+
 /// One backend is enough; without any nothing can be drawn.
 Finding any_backend() {
   const auto context = make_gl_context({.backend = "auto", .device = -1, .local_rank = 0, .threads = 1});
@@ -266,6 +286,7 @@ std::vector<Check> graphics_checks() {
     checks.push_back({fmt::format("OpenGL by {}", backend), [backend] { return try_backend(backend); }});
   }
   checks.push_back({"OpenGL", any_backend});
+  checks.push_back({"Vulkan", list_gpus});
   return checks;
 }
 

@@ -15,29 +15,7 @@
 namespace hpr {
 namespace {
 
-using test::add_material;
-using test::add_mesh;
-using test::place_mesh;
-using test::quad;
-
-/// A closed box of one grey that emits, two of `size` a side: light is the same everywhere inside.
-Scene furnace(float albedo, float emission, float size = 1.0F) {
-  Scene scene;
-  Material wall = test::diffuse(glm::vec3(albedo));
-  wall.emissive = glm::vec3(emission);
-  add_material(scene, wall);
-  const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b) {
-    place_mesh(scene, add_mesh(scene, quad(size * corner, size * a, size * b, 0)));
-  };
-  side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0});
-  side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0});
-  side({-1, -1, -1}, {0, 2, 0}, {0, 0, 2});
-  side({1, -1, -1}, {0, 0, 2}, {0, 2, 0});
-  side({-1, -1, -1}, {0, 0, 2}, {2, 0, 0});
-  side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
-  finish_scene(scene);
-  return scene;
-}
+using test::furnace;
 
 /// A furnace with all that its photons need.
 struct LitFurnace : test::PhotonRoom {
@@ -49,19 +27,6 @@ struct LitFurnace : test::PhotonRoom {
 
   LightSampler lights;
 };
-
-class PhotonFurnace : public testing::TestWithParam<double> {};
-
-TEST_P(PhotonFurnace, IsAsBrightAsItsSeriesSums) {
-  const double albedo = GetParam();
-  const Scene scene = furnace(static_cast<float>(albedo), 1.0F);
-  const View view = test::view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {8, 8}, scene, 0.5);
-  const RaySettings settings{.photons = 100'000, .global_photons = true};
-  const glm::dvec3 mean = test::mean_pixel(scene, view, 4, 4, 32, settings);
-  EXPECT_NEAR(mean.g * (1.0 - albedo), 1.0, 0.02);
-}
-
-INSTANTIATE_TEST_SUITE_P(Albedos, PhotonFurnace, testing::Values(0.5, 0.8));
 
 TEST(PhotonPass, RanksShareTheWorkAndGetTheSamePicture) {
   const Scene scene = furnace(0.5F, 1.0F);

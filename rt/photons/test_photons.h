@@ -42,6 +42,25 @@ inline Material clear_glass() {
   return glass;
 }
 
+/// A closed box of one grey that emits, two of `size` a side: light is the same everywhere inside.
+inline Scene furnace(float albedo, float emission, float size = 1.0F) {
+  Scene scene;
+  Material wall = test::diffuse(glm::vec3(albedo));
+  wall.emissive = glm::vec3(emission);
+  add_material(scene, wall);
+  const auto side = [&](glm::vec3 corner, glm::vec3 a, glm::vec3 b) {
+    place_mesh(scene, add_mesh(scene, quad(size * corner, size * a, size * b, 0)));
+  };
+  side({-1, -1, -1}, {2, 0, 0}, {0, 2, 0});
+  side({-1, -1, 1}, {0, 2, 0}, {2, 0, 0});
+  side({-1, -1, -1}, {0, 2, 0}, {0, 0, 2});
+  side({1, -1, -1}, {0, 0, 2}, {0, 2, 0});
+  side({-1, -1, -1}, {0, 0, 2}, {2, 0, 0});
+  side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
+  finish_scene(scene);
+  return scene;
+}
+
 /// A scene with all that photons need.
 struct PhotonRoom {
   explicit PhotonRoom(Scene built)
