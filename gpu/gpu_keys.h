@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "gpu/gpu_batch.h"
+#include "gpu/gpu_buffer.h"
+#include "gpu/gpu_device.h"
+#include "gpu/gpu_kernel.h"
+#include "gpu/gpu_scene.h"
+#include "image/image.h"
+#include "image/key.h"
+#include "scene/view.h"
+
+namespace hpr {
+
+/// Makes keys by one ray through each pixel's centre: what PrimaryRays makes, on a device.
+///
+/// Depths are computed in double, in the steps and the order of the CPU's, and the largest key among the triangles a
+/// ray meets stays: the same scene gives the same keys however its surfaces are dealt out. Against PrimaryRays other
+/// surfaces are seen where a ray meets an edge but for rounding, and depths of very large triangles, which the CPU
+/// meets in parts, differ in their last bits.
+class GpuKeys {
+ public:
+  explicit GpuKeys(const GpuDevice& device);
+
+  /// The keys of a view, which has no points (View::points), as large as it.
+  [[nodiscard]] Image<Key> draw(const GpuScene& scene, const View& view);
+  /// What the last draw() took on the device.
+  [[nodiscard]] const std::vector<GpuPassTime>& times() const { return batch_.times(); }
+
+ private:
+  const GpuDevice& device_;
+  GpuKernel kernel_;
+  GpuBuffer view_;
+  std::optional<GpuBuffer> keys_;
+  std::optional<GpuBuffer> read_;
+  GpuBatch batch_;
+};
+
+}  // namespace hpr

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "gpu/gpu_buffer.h"
+#include "gpu/gpu_device.h"
+#include "scene/scene.h"
+
+namespace hpr {
+
+/// Surfaces of a scene in a device's memory, as shaders read them (gpu/shaders/scene.glsl): meshes with a tree of their
+/// triangles each, and a tree of their instances. The device must outlive it.
+class GpuScene {
+ public:
+  /// `objects`: the surfaces it holds. The whole meshes have to be here (Mesh::partial). Throws Error (Limit) where
+  /// they do not fit into the device's memory.
+  GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects);
+
+  /// As SceneTrees of scene.glsl.
+  [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
+  /// On the device.
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  std::vector<GpuBuffer> buffers_;  ///< what others refer to comes before them; the last one is the scene's tree
+};
+
+}  // namespace hpr

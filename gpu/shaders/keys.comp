@@ -1,0 +1,194 @@
+// Keys by one ray through each pixel's centre: those of PrimaryRays (rt/trace/primary_rays.h), whose key_along this repeats
+// step by step, so that depths are equal to the bit where the same triangle is met.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "threads.glsl"
+
+#include "scene.glsl"
+
+struct View {
+  dvec3 eye;
+  dvec3 right;
+  dvec3 up;
+  dvec3 back;
+  double left_edge;
+  double right_edge;
+  double bottom_edge;
+  double top_edge;
+  double near_distance;
+  double far_distance;  // orthographic only
+  dvec2 jitter;
+  ivec2 block;   // its upper left corner on the screen
+  uvec2 size;    // of the block
+  uvec2 screen;  // pixels of the whole screen
+  uint orthographic;
+  uint padding;
+};
+layout(buffer_reference, scalar) readonly buffer Views {
+  View view;
+};
+layout(buffer_reference, scalar) writeonly buffer Keys {
+  uint64_t keys[];
+};
+layout(push_constant, scalar) uniform Constants {
+  Keys found_keys;
+  Views views;
+  SceneTrees scene;
+};
+
+struct Ray {
+  dvec3 origin;
+  dvec3 direction;  // one metre along the view's axis
+};
+
+Ray view_ray(View view, uvec2 pixel) {
+  precise dvec2 at = (dvec2(view.block) + (dvec2(pixel) + 0.5) + view.jitter) / dvec2(view.screen);
+  precise double x = view.left_edge + (view.right_edge - view.left_edge) * at.x;
+  precise double y = view.top_edge - (view.top_edge - view.bottom_edge) * at.y;
+  precise dvec3 direction;
+  precise dvec3 origin;
+  if (view.orthographic != 0u) {
+    origin = view.eye + (view.right * x + view.up * y + view.back * double(0.0));
+    direction = -view.back;
+  } else {
+    origin = view.eye;
+    direction = view.right * x + view.up * y + view.back * double(-1.0);
+  }
+  return Ray(origin, direction);
+}
+
+precise dvec3 exact_cross(dvec3 a, dvec3 b) {
+  precise dvec3 c = dvec3(a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y);
+  return c;
+}
+precise double exact_dot(dvec3 a, dvec3 b) {
+  precise dvec3 products = a * b;
+  precise double sum = products.x + products.y + products.z;
+  return sum;
+}
+precise dvec3 exact_linear(dmat4x3 matrix, dvec3 v) {
+  precise dvec3 image = matrix[0] * v.x + matrix[1] * v.y + matrix[2] * v.z;
+  return image;
+}
+
+struct Found {
+  uint64_t key;
+  double along;  // metres from the eye along the view's axis
+};
+
+// Barycentric coordinates may be so much off the triangle, for rounding.
+const double kEdge = 1e-12;
+
+void meet(View view, Ray ray, Instance instance, uint triangle, inout Found found) {
+  uvec3 corners = instance.triangles.triangles[triangle];
+  dvec3 p0 = dvec3(instance.positions.positions[corners.x]);
+  precise dvec3 d1 = dvec3(instance.positions.positions[corners.y]) - p0;
+  precise dvec3 d2 = dvec3(instance.positions.positions[corners.z]) - p0;
+  precise dvec3 e1 = exact_linear(instance.to_world, d1);
+  precise dvec3 e2 = exact_linear(instance.to_world, d2);
+  precise dvec3 v0 = exact_linear(instance.to_world, p0) + (instance.to_world[3] - view.eye);
+
+  precise dvec3 from_v0 = (ray.origin - view.eye) - v0;
+  precise dvec3 p = exact_cross(ray.direction, e2);
+  precise dvec3 q = exact_cross(from_v0, e1);
+  precise double determinant = exact_dot(e1, p);
+  if (double(instance.front) * determinant < 0.0) return;
+  precise double u = exact_dot(from_v0, p) / determinant;
+  precise double v = exact_dot(ray.direction, q) / determinant;
+  if (!(u >= -kEdge && v >= -kEdge && u + v <= 1.0 + kEdge)) return;  // nor where the triangle is seen edge-on
+  u = max(u, double(0.0));
+  v = max(v, double(0.0));
+  precise double sum = max(u + v, double(1.0));
+  u = u / sum;
+  v = v / sum;
+  precise dvec3 place = v0 + u * e1 + v * e2;
+  precise double along = -exact_dot(place, view.back);
+
+  precise double reversed = view.orthographic != 0u
+                                ? (view.far_distance - along) / (view.far_distance - view.near_distance)
+                                : view.near_distance / along;
+  float depth = float(reversed);
+  if (!(depth > 0.0) || !(depth <= 1.0)) return;
+  uint64_t key = (uint64_t(floatBitsToUint(depth)) << 32) | uint64_t(~(instance.first_surface + triangle));
+  if (key > found.key) {
+    found.key = key;
+    found.along = along;
+  }
+}
+
+// Up to where other surfaces may have as large a key: what rounds to the same depth, and what single precision adds.
+float limit_of(View view, Found found) {
+  if (found.key == 0ul) return 3.0e38;
+  double step = view.orthographic != 0u ? (view.far_distance - view.near_distance) * 2.4e-7 : double(0.0);
+  return float(found.along + abs(found.along) * 1e-6 + step);
+}
+
+void trace_mesh(View view, Ray ray, Instance instance, inout Found found) {
+  BoxRay boxes = make_box_ray(instance.to_boxes * (ray.origin - instance.box_origin),
+                              instance.to_boxes * ray.direction, instance.largest);
+  uint stack[kMaxBvhDepth];
+  uint open = 0u;
+  uint at = 0u;
+  if (enters(boxes, instance.nodes.nodes[0], limit_of(view, found)) < 0.0) return;
+  while (true) {
+    BvhNode node = instance.nodes.nodes[at];
+    if (node.items > 0u) {
+      for (uint i = 0u; i < node.items; ++i) {
+        meet(view, ray, instance, instance.items.indices[node.first + i], found);
+      }
+    } else {
+      float limit = limit_of(view, found);
+      float a = enters(boxes, instance.nodes.nodes[node.first], limit);
+      float b = enters(boxes, instance.nodes.nodes[node.first + 1u], limit);
+      if (a >= 0.0 && b >= 0.0) {
+        stack[open++] = a <= b ? node.first + 1u : node.first;
+        at = a <= b ? node.first : node.first + 1u;
+        continue;
+      }
+      if (a >= 0.0 || b >= 0.0) {
+        at = a >= 0.0 ? node.first : node.first + 1u;
+        continue;
+      }
+    }
+    if (open == 0u) return;
+    at = stack[--open];
+  }
+}
+
+void trace_scene(View view, Ray ray, SceneTree tree, inout Found found) {
+  if (tree.is_empty != 0u) return;
+  precise dvec3 origin = ray.origin - tree.center;
+  BoxRay boxes = make_box_ray(origin, ray.direction, tree.largest);
+  uint stack[kMaxBvhDepth];
+  uint open = 0u;
+  uint at = 0u;
+  while (true) {
+    BvhNode node = tree.nodes.nodes[at];
+    bool meets = enters(boxes, node, limit_of(view, found)) >= 0.0;
+    if (meets && node.items > 0u) {
+      for (uint i = 0u; i < node.items; ++i) {
+        trace_mesh(view, ray, tree.instances.instances[tree.items.indices[node.first + i]], found);
+      }
+    } else if (meets) {
+      float limit = limit_of(view, found);
+      float a = enters(boxes, tree.nodes.nodes[node.first], limit);
+      float b = enters(boxes, tree.nodes.nodes[node.first + 1u], limit);
+      bool first_is_nearer = b < 0.0 || (a >= 0.0 && a <= b);
+      stack[open++] = first_is_nearer ? node.first + 1u : node.first;
+      at = first_is_nearer ? node.first : node.first + 1u;
+      continue;
+    }
+    if (open == 0u) return;
+    at = stack[--open];
+  }
+}
+
+void main() {
+  View view = views.view;
+  uint64_t i = thread_index();
+  if (i >= uint64_t(view.size.x) * view.size.y) return;
+  uvec2 pixel = uvec2(uint(i) % view.size.x, uint(i) / view.size.x);
+  Found found = Found(0ul, double(0.0));
+  trace_scene(view, view_ray(view, pixel), scene.tree, found);
+  found_keys.keys[uint(i)] = found.key;
+}
