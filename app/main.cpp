@@ -20,6 +20,7 @@
 #include "core/job_environment.h"
 #include "core/log.h"
 #include "core/signals.h"
+#include "engine/session.h"
 #include "raster/gl_context.h"
 
 namespace hpr {
@@ -56,7 +57,7 @@ void configure_log(Globals& globals) {
 /// Checks --backend, also for commands that draw nothing. Windows are GLFW's, whatever draws their pictures.
 void settle_backend(Globals& globals, const Command& command) {
   if (globals.backend == "glfw" && command.opens_windows()) globals.backend = "auto";
-  check_gl_backend(globals.backend);
+  if (globals.backend != kVulkan) check_gl_backend(globals.backend);
 }
 
 ExitCode run(const std::vector<std::string>& arguments) {

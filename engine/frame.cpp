@@ -14,6 +14,7 @@
 #include "engine/session.h"
 #include "engine/tile_ownership.h"
 #include "engine/verification.h"
+#include "gpu/gpu_primary_rays.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
 #include "rt/show/show.h"
@@ -45,7 +46,9 @@ void prepare(Session& session, const FramePlan& plan) {
     if (session.scene().part_pages) {
       session.partition_rays(plan.rays);  // pages come as they are drawn
     } else if (plan.primary == Primary::Rays) {
-      (void)session.primary_rays(plan.mine.objects, plan.rays);
+      if (session.gpu_primary_rays(plan.mine.objects) == nullptr) {
+        (void)session.primary_rays(plan.mine.objects, plan.rays);
+      }
     } else {
       (void)session.rasterizer(plan.mine.objects);
     }
@@ -75,6 +78,25 @@ void rasterize_objects(Session& session, const FramePlan& plan, std::span<const 
     }
     spent.raster += rasterizer.stats();
   }
+}
+
+/// trace_primary(), on a device; false where that cannot: where rays go through points or pixels are left out.
+bool trace_on_device(Session& session, const FramePlan& plan, std::span<const SurfaceRange> objects,
+                     std::span<const JitteredViews> jittered, std::span<TileLayer<Key>* const> keys, FrameWork& work) {
+  const auto has_points = [](const View& view) { return view.points.has_value(); };
+  if (jittered.front().sample.wanted != nullptr || std::ranges::any_of(jittered.front().views, has_points))
+    return false;
+  GpuPrimaryRays* const device = session.gpu_primary_rays(objects);
+  if (device == nullptr) return false;
+  const trace::Span span("primary rays, on the device");
+  const Stopwatch watch;
+  for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
+    const std::vector<Rect> parts = parts_of(plan.mine.area, screen);
+    for (std::size_t i = 0; i < jittered.size(); ++i) device->draw(jittered[i].views[screen], screen, parts, *keys[i]);
+  }
+  session.balance().add_keys(plan.layout, plan.tiles, watch.ms());  // what each tile took of it is not known
+  work.keys_ms += watch.ms();
+  return true;
 }
 
 /// trace_primary(), through some of this rank's objects.
@@ -115,6 +137,7 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
   session.partition_rays(plan.rays);
   PrimaryRayStats stats;
   session.draw_pages(plan.mine.objects, [&](std::span<const SurfaceRange> objects) {
+    if (trace_on_device(session, plan, objects, jittered, keys, work)) return;
     stats += trace_objects(session, plan, objects, jittered, keys, work);
   });
   return stats;

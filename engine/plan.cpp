@@ -332,12 +332,17 @@ void partition(const Session& session, FramePlan& plan) {
 /// Collective where the choice is left open: who makes the keys, and why.
 PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
                                std::span<const View> views) {
-  if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
+  const bool rounds_depth = settings.depth_format != DepthFormat::Float32;
+  const std::string gpu = rounds_depth ? "" : session.gpu_of_keys();
+  if (settings.primary != Primary::Auto) {
+    return {settings.primary, gpu.empty() || settings.primary == Primary::Raster ? "as asked" : "as asked, by " + gpu};
+  }
+  if (!gpu.empty()) return {Primary::Rays, "by " + gpu + ", as asked by --backend vulkan"};
   KeyWork work{.triangles = session.scene().triangles,
                .own_triangles = mesh_triangles(session.scene()),
                .single_picture = settings.single_picture};
   for (const View& view : views) work.pixels += view.size().area();
-  work.rounds_depth = settings.depth_format != DepthFormat::Float32;
+  work.rounds_depth = rounds_depth;
   work.software_gl = work.rounds_depth || session.draws_by_software();
   work.ray_scene_is_for_keys = !traces_rays_beside_keys(session.requirements(), plan.rays);
   return choose_primary(work);

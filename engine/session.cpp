@@ -18,6 +18,7 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "engine/balance/load_balance.h"
+#include "gpu/gpu_primary_rays.h"
 #include "raster/chunk_bounds.h"
 #include "raster/gl_context.h"
 #include "raster/raster_speed.h"
@@ -81,18 +82,48 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
       balance_(std::make_unique<LoadBalance>()) {
   warn_of_scene();
   limit_software_gl(host_.threads);
-  if (settings_.backend != "auto" || settings_.device >= 0) start_gl();
+  if (settings_.backend == kVulkan) {
+    start_vulkan();
+  } else if (settings_.backend != "auto" || settings_.device >= 0) {
+    start_gl();
+  }
 }
 
 Session::~Session() = default;
 
+void Session::start_vulkan() {
+  agree_on_failure(comm_, [&] {
+    const trace::Span span("start Vulkan");
+    // Who names Vulkan is content with a device on the CPU.
+    gpu_primary_rays_ = std::make_unique<GpuPrimaryRays>(
+        GpuOptions{.device = settings_.device, .local_rank = host_.local_rank, .software = true});
+  });
+  const GpuInfo& device = gpu_primary_rays_->info();
+  log::debug("Vulkan: {}, {}", device.name, device.driver);
+  if (comm_.rank() != 0) return;
+  if (device.software) log::warning("Vulkan has no GPU here: {} does its work on the CPU, slowly", device.name);
+  if (!fits_on_gpu(scene_)) log::warning("Embree makes the keys: no device takes parts of scenes");
+}
+
+GpuPrimaryRays* Session::gpu_primary_rays(std::span<const SurfaceRange> objects) {
+  if (!gpu_primary_rays_ || !fits_on_gpu(scene_)) return nullptr;
+  const trace::Span span("scene to device");
+  gpu_primary_rays_->hold(scene_, objects);
+  return gpu_primary_rays_.get();
+}
+
+std::string Session::gpu_of_keys() const {
+  return gpu_primary_rays_ && fits_on_gpu(scene_) ? gpu_primary_rays_->info().name : "";
+}
+
 void Session::start_gl() {
   if (gl_) return;
   std::unique_ptr<GlContext> context;
+  const bool by_vulkan = settings_.backend == kVulkan;
   agree_on_failure(comm_, [&] {
     const trace::Span span("start OpenGL");
-    context = make_gl_context({.backend = settings_.backend,
-                               .device = settings_.device,
+    context = make_gl_context({.backend = by_vulkan ? "auto" : settings_.backend,
+                               .device = by_vulkan ? -1 : settings_.device,
                                .local_rank = host_.local_rank,
                                .threads = host_.threads});
   });
@@ -118,6 +149,9 @@ std::string Session::gl_description() const {
 }
 
 std::string Session::gpu() const {
+  if (gpu_primary_rays_ && !gpu_primary_rays_->info().software) {
+    return host_.host + ": " + gpu_primary_rays_->info().name;
+  }
   return gl_ && !gl_->software() ? host_.host + ": " + gl_->description() : "";
 }
 
@@ -161,6 +195,7 @@ void Session::warn_of_scene() const {
 
 void Session::release_scene() {
   release_rays();
+  if (gpu_primary_rays_) gpu_primary_rays_->release();
   part_.reset();
   forwarding_.reset();
   traced_objects_.clear();

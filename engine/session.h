@@ -25,14 +25,18 @@ class LoadBalance;
 class PrimaryRays;
 class Rasterizer;
 class RayScene;
+class GpuPrimaryRays;
 class RayForwarding;
 class TileGather;
 struct SceneChunks;
 
+/// The backend by which a device makes keys, see GpuPrimaryRays; OpenGL is then used only where it is asked for.
+inline constexpr std::string_view kVulkan = "vulkan";
+
 /// What a session uses of the machine that each of its ranks runs on.
 struct SessionSettings {
-  std::string backend = "auto";  ///< OpenGL by it, see GlContextSettings
-  int device = -1;               ///< EGL device; -1: by local rank
+  std::string backend = "auto";  ///< OpenGL by it, see GlOptions; or kVulkan
+  int device = -1;               ///< of EGL or of Vulkan; -1: by local rank
   int threads = 0;               ///< of one rank; 0: the machine's cores divided among the ranks of a host
 };
 
@@ -96,6 +100,11 @@ class Session {
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
+  /// The device that makes these keys in place of primary_rays(), with `objects` on it; null where settings name none,
+  /// or it has no room for parts of scenes.
+  [[nodiscard]] GpuPrimaryRays* gpu_primary_rays(std::span<const SurfaceRange> objects);
+  /// Its name, where it will be asked; empty: none.
+  [[nodiscard]] std::string gpu_of_keys() const;
   /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where
   /// rays meet a part of the scene.
   [[nodiscard]] Rasterizer& whole_rasterizer();
@@ -123,6 +132,7 @@ class Session {
   [[nodiscard]] std::span<TileLayer<Key>> round_keys(const FrameLayout& layout, std::size_t count);
 
  private:
+  void start_vulkan();
   void compare_rasterizers();
   void warn_of_scene() const;
   /// Ends what was made with a group that has other members.
@@ -172,6 +182,7 @@ class Session {
   std::unique_ptr<RayScene> traced_part_;  ///< of primary_rays_; none where ray_scene_ is
   std::unique_ptr<PrimaryRays> primary_rays_;
   std::unique_ptr<PrimaryRays> whole_primary_rays_;
+  std::unique_ptr<GpuPrimaryRays> gpu_primary_rays_;
   std::optional<RaySettings> ray_settings_;
   std::unique_ptr<DeferredShader> shader_;
   Group group_;

@@ -12,7 +12,7 @@ namespace hpr {
 namespace {
 
 constexpr std::uint32_t kStamps = GpuBatch::kMaxPasses + 1;
-constexpr std::uint32_t kMaxGroupsAcross = 65'535;  // of every device
+constexpr std::uint32_t kMaxGroupsAcross = 65'535;  // every device allows this many
 
 }  // namespace
 
@@ -45,15 +45,19 @@ GpuBatch::GpuBatch(const GpuDevice& device) : device_(device) {
 }
 
 GpuBatch::~GpuBatch() {
-  try {
-    wait();
-  } catch (const Error& error) {
-    log::error("{}", error.what());
+  if (in_flight_ && !is_late_) {
+    try {
+      wait();
+    } catch (const Error& error) {
+      log::error("{}", error.what());
+    }
   }
+  if (in_flight_) device_.give_up();
   release();
 }
 
 void GpuBatch::release() {
+  if (device_.is_given_up()) return;
   const VulkanFunctions& vk = device_.vk();
   if (stamps_ != VK_NULL_HANDLE) vk.DestroyQueryPool(device_.handle(), stamps_, nullptr);
   if (semaphore_ != VK_NULL_HANDLE) vk.DestroySemaphore(device_.handle(), semaphore_, nullptr);
@@ -62,12 +66,13 @@ void GpuBatch::release() {
 
 void GpuBatch::begin() {
   HPR_CHECK(!in_flight_);
-  if (std::exchange(recording_, true)) return;
+  if (recording_) return;
   const VulkanFunctions& vk = device_.vk();
   device_.check(vk.ResetCommandPool(device_.handle(), pool_, 0), "beginning a batch");
   auto once = vulkan_structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   once.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   device_.check(vk.BeginCommandBuffer(commands_, &once), "beginning a batch");
+  recording_ = true;
   if (stamps_ != VK_NULL_HANDLE) vk.CmdResetQueryPool(commands_, stamps_, 0, kStamps);
   passes_.clear();
   order();
@@ -123,6 +128,7 @@ void GpuBatch::copy(const GpuBuffer& from, const GpuBuffer& to, std::size_t byte
 
 void GpuBatch::fill(const GpuBuffer& buffer, std::uint32_t word) {
   HPR_CHECK(buffer.bytes() % 4 == 0);
+  if (buffer.bytes() == 0) return;
   begin();
   device_.vk().CmdFillBuffer(commands_, buffer.handle(), 0, buffer.bytes(), word);
   order();
@@ -156,8 +162,10 @@ void GpuBatch::wait() {
   until.pSemaphores = &semaphore_;
   until.pValues = &submitted_;
   const auto limit = static_cast<std::uint64_t>(std::chrono::nanoseconds(device_.limit()).count());
-  device_.check(device_.vk().WaitSemaphores(device_.handle(), &until, limit), "computing");
-  in_flight_ = false;
+  const VkResult result = device_.vk().WaitSemaphores(device_.handle(), &until, limit);
+  is_late_ = result == VK_TIMEOUT;
+  in_flight_ = result == VK_TIMEOUT;
+  device_.check(result, "computing");
   read_times();
 }
 
@@ -171,7 +179,7 @@ void GpuBatch::read_times() {
                                                  VK_QUERY_RESULT_64_BIT),
                 "reading its clock");
   for (std::size_t i = 0; i < passes_.size(); ++i) {
-    const auto elapsed = static_cast<double>(ticks.at(i + 1) - ticks.at(i));
+    const auto elapsed = static_cast<double>((ticks.at(i + 1) - ticks.at(i)) & device_.timestamp_mask());
     times_.push_back({passes_[i], 1e-6 * device_.timestamp_ns() * elapsed});
   }
 }

@@ -24,7 +24,7 @@ struct GpuPassTime {
 class GpuBatch {
  public:
   explicit GpuBatch(const GpuDevice& device);
-  /// Waits for what was submitted, or until its limit.
+  /// Waits for what was submitted, unless that was in vain before. Gives the device up where it does not end.
   ~GpuBatch();
   GpuBatch(const GpuBatch&) = delete;
   GpuBatch& operator=(const GpuBatch&) = delete;
@@ -50,7 +50,8 @@ class GpuBatch {
   /// Until it is done. Throws Error: Hang past the device's limit, after which it may be waited for again; NoDevice
   /// where the device was lost.
   void wait();
-  /// Of the last batch that was waited for; empty where the device has no clock.
+  /// Of the last batch that was waited for; empty where it had no passes or the device
+  /// has no clock.
   [[nodiscard]] const std::vector<GpuPassTime>& times() const { return times_; }
 
  private:
@@ -69,6 +70,7 @@ class GpuBatch {
   std::uint64_t submitted_ = 0;  ///< the semaphore's value once all is done
   bool recording_ = false;
   bool in_flight_ = false;
+  bool is_late_ = false;  ///< was waited for in vain
   std::vector<std::string> passes_;
   std::vector<GpuPassTime> times_;
 

@@ -29,13 +29,12 @@ std::array<VkMemoryPropertyFlags, 2> kinds_of(GpuMemory memory) {
 
 }  // namespace
 
-GpuBuffer::GpuBuffer(const GpuDevice& device, std::size_t bytes, GpuMemory memory)
-    : device_(&device), bytes_(std::max<std::size_t>(bytes, 4)) {
+GpuBuffer::GpuBuffer(const GpuDevice& device, std::size_t bytes, GpuMemory memory) : device_(&device), bytes_(bytes) {
   const VulkanFunctions& vk = device.vk();
   const std::string doing = fmt::format("allocating {}", format_bytes(bytes_));
   try {
     auto wanted = vulkan_structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
-    wanted.size = bytes_;
+    wanted.size = std::max<std::size_t>(bytes_, 4);
     wanted.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
                    VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     device.check(vk.CreateBuffer(device.handle(), &wanted, nullptr, &buffer_), doing);
@@ -51,7 +50,7 @@ GpuBuffer::GpuBuffer(const GpuDevice& device, std::size_t bytes, GpuMemory memor
     for (const VkMemoryPropertyFlags kind : kinds_of(memory)) {
       if (type < 0) type = device.memory_type(needed.memoryTypeBits, kind);
     }
-    if (type < 0) device.check(VK_ERROR_OUT_OF_DEVICE_MEMORY, doing);
+    if (type < 0 || needed.size > device.heap_bytes(type)) device.check(VK_ERROR_OUT_OF_DEVICE_MEMORY, doing);
     allocation.memoryTypeIndex = static_cast<std::uint32_t>(type);
     device.check(vk.AllocateMemory(device.handle(), &allocation, nullptr, &memory_), doing);
     device.check(vk.BindBufferMemory(device.handle(), buffer_, memory_, 0), doing);
@@ -80,6 +79,7 @@ GpuBuffer::~GpuBuffer() {
 }
 
 void GpuBuffer::release() {
+  if (device_->is_given_up()) return;
   if (buffer_ != VK_NULL_HANDLE) device_->vk().DestroyBuffer(device_->handle(), buffer_, nullptr);
   if (memory_ != VK_NULL_HANDLE) device_->vk().FreeMemory(device_->handle(), memory_, nullptr);
 }

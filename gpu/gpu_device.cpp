@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -72,7 +74,7 @@ struct GpuDevice::Instance {
   VulkanFunctions vk;
   VkInstance handle = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger = VK_NULL_HANDLE;
-  std::atomic<std::uint64_t> findings{0};
+  std::shared_ptr<std::atomic<std::uint64_t>> findings = std::make_shared<std::atomic<std::uint64_t>>(0);
   std::vector<VkPhysicalDevice> devices;
 
   explicit Instance(bool validate);
@@ -103,12 +105,18 @@ GpuDevice::Instance::Instance(bool validate) {
   application.apiVersion = kVersion;
   auto wanted = vulkan_structure<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   wanted.pApplicationInfo = &application;
-  const char* const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+  constexpr std::array<const char*, 2> kExtensions{VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
+                                                   VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+  const VkValidationFeatureEnableEXT order = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
+  auto features = vulkan_structure<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
+  features.enabledValidationFeatureCount = 1;
+  features.pEnabledValidationFeatures = &order;
   if (validates) {
+    wanted.pNext = &features;
     wanted.enabledLayerCount = 1;
     wanted.ppEnabledLayerNames = &kValidationLayer;
-    wanted.enabledExtensionCount = 1;
-    wanted.ppEnabledExtensionNames = &extension;
+    wanted.enabledExtensionCount = static_cast<std::uint32_t>(kExtensions.size());
+    wanted.ppEnabledExtensionNames = kExtensions.data();
   }
   const auto create = reinterpret_cast<PFN_vkCreateInstance>(vk.GetInstanceProcAddr(nullptr, "vkCreateInstance"));
   const VkResult made = create(&wanted, nullptr, &handle);
@@ -130,7 +138,7 @@ GpuDevice::Instance::Instance(bool validate) {
         VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
     to.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
     to.pfnUserCallback = note_finding;
-    to.pUserData = &findings;
+    to.pUserData = findings.get();
     if (vk.CreateDebugUtilsMessengerEXT(handle, &to, nullptr, &messenger) != VK_SUCCESS) messenger = VK_NULL_HANDLE;
   }
   std::uint32_t count = 0;
@@ -201,15 +209,19 @@ std::optional<std::uint32_t> computing_family(const std::vector<VkQueueFamilyPro
 }
 
 GpuInfo info_of(const VulkanFunctions& vk, VkPhysicalDevice device, int index) {
+  auto ids = vulkan_structure<VkPhysicalDeviceIDProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES);
   auto driver = vulkan_structure<VkPhysicalDeviceDriverProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES);
   auto properties = vulkan_structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
   properties.pNext = &driver;
+  driver.pNext = &ids;
   vk.GetPhysicalDeviceProperties2(device, &properties);
   GpuInfo info;
   info.index = index;
   info.name = properties.properties.deviceName;
   info.driver = driver.driverInfo;
   info.software = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  info.discrete = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+  std::ranges::copy(ids.deviceUUID, info.uuid.begin());
   VkPhysicalDeviceMemoryProperties memory{};
   vk.GetPhysicalDeviceMemoryProperties(device, &memory);
   for (std::uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
@@ -262,16 +274,20 @@ GpuInfo choose_gpu(const std::vector<GpuInfo>& gpus, const GpuOptions& options) 
     }
     return gpus[at];
   }
-  for (const bool software : {false, true}) {
-    if (software && !options.software) break;
+  const std::array<std::function<bool(const GpuInfo&)>, 3> kinds{
+      [](const GpuInfo& gpu) { return gpu.discrete; },
+      [](const GpuInfo& gpu) { return !gpu.discrete && !gpu.software; },
+      [&](const GpuInfo& gpu) { return gpu.software && options.software; }};
+  for (const auto& is_of_kind : kinds) {
     std::vector<const GpuInfo*> usable;
     for (const GpuInfo& gpu : gpus) {
-      if (gpu.software == software && gpu.lacks.empty()) usable.push_back(&gpu);
+      const bool is_new = std::ranges::none_of(usable, [&](const GpuInfo* other) { return other->uuid == gpu.uuid; });
+      if (is_of_kind(gpu) && gpu.lacks.empty() && is_new) usable.push_back(&gpu);
     }
     if (!usable.empty()) return *usable[static_cast<std::size_t>(options.local_rank) % usable.size()];
   }
   throw Error(ExitCode::NoDevice, fmt::format("no GPU that Vulkan can compute on; devices: {}", list_of(gpus)),
-              "name one by --device, or leave the work to the CPU");
+              "install the driver of the GPU, or leave the work to the CPU");
 }
 
 GpuDevice::GpuDevice(const GpuOptions& options)
@@ -285,7 +301,9 @@ GpuDevice::GpuDevice(const GpuOptions& options)
   queue_family_ = computing_family(families).value();
   auto properties = vulkan_structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
   vk_->GetPhysicalDeviceProperties2(physical, &properties);
-  if (families[queue_family_].timestampValidBits > 0) {
+  const std::uint32_t bits = families[queue_family_].timestampValidBits;
+  if (bits > 0) {
+    timestamp_mask_ = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
     timestamp_ns_ = static_cast<double>(properties.properties.limits.timestampPeriod);
   }
   vk_->GetPhysicalDeviceMemoryProperties(physical, &memory_);
@@ -306,7 +324,7 @@ GpuDevice::GpuDevice(const GpuOptions& options)
     throw Error(ExitCode::NoDevice,
                 fmt::format("Vulkan device {} ({}) does not start (VkResult {})", info_.index, info_.name,
                             static_cast<int>(made)),
-                "another program may hold all of its memory; hpr doctor says what it is");
+                "another program may hold all of its memory; hpr doctor lists the devices");
   }
 #define HPR_VULKAN_LOAD(name) \
   functions_->name = reinterpret_cast<PFN_vk##name>(vk_->GetDeviceProcAddr(device_, "vk" #name));
@@ -316,10 +334,15 @@ GpuDevice::GpuDevice(const GpuOptions& options)
 }
 
 GpuDevice::~GpuDevice() {
+  if (given_up_) {
+    (void)instance_.release();
+    (void)functions_.release();
+    return;
+  }
   if (device_ != VK_NULL_HANDLE) vk_->DestroyDevice(device_, nullptr);
 }
 
-std::uint64_t GpuDevice::validation_errors() const {
+std::shared_ptr<const std::atomic<std::uint64_t>> GpuDevice::validation_errors() const {
   return instance_->findings;
 }
 
@@ -334,6 +357,10 @@ int GpuDevice::memory_type(std::uint32_t types, VkMemoryPropertyFlags wanted) co
   return -1;
 }
 
+std::uint64_t GpuDevice::heap_bytes(int memory_type) const {
+  return memory_.memoryHeaps[memory_.memoryTypes[memory_type].heapIndex].size;
+}
+
 void GpuDevice::check(VkResult result, std::string_view doing) const {
   if (result == VK_SUCCESS) return;
   const std::string who = fmt::format("Vulkan device {} ({})", info_.index, info_.name);
@@ -343,9 +370,9 @@ void GpuDevice::check(VkResult result, std::string_view doing) const {
                   "see what the system's log says of it (dmesg); start again, or leave the work to the CPU");
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
     case VK_ERROR_OUT_OF_HOST_MEMORY:
-      throw Error(
-          ExitCode::Limit, fmt::format("{} has no memory left while {}", who, doing),
-          fmt::format("it has {}: give it less, or end other programs that use it", format_bytes(info_.memory)));
+      throw Error(ExitCode::Limit, fmt::format("{} has no memory left while {}", who, doing),
+                  fmt::format("it has {} of its own: give it less, or end other programs that use it",
+                              format_bytes(info_.memory)));
     case VK_TIMEOUT:
       throw Error(ExitCode::Hang, fmt::format("{} has not answered for {} s while {}", who, limit_.count(), doing),
                   "see what the system's log says of it (dmesg)");

@@ -37,6 +37,7 @@ GpuKernel::GpuKernel(const GpuDevice& device, std::span<const std::uint32_t> spi
 }
 
 GpuKernel::~GpuKernel() {
+  if (device_.is_given_up()) return;
   device_.vk().DestroyPipeline(device_.handle(), pipeline_, nullptr);
   device_.vk().DestroyPipelineLayout(device_.handle(), layout_, nullptr);
 }

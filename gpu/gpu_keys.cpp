@@ -66,7 +66,7 @@ GpuKeys::GpuKeys(const GpuDevice& device)
 Image<Key> GpuKeys::draw(const GpuScene& scene, const View& view) {
   HPR_CHECK(!view.points);
   Image<Key> image(view.size());
-  const std::size_t bytes = image.pixels().size_bytes();
+  const std::size_t bytes = image.pixels().size() * sizeof(Key);
   if (bytes == 0) return image;
   if (!keys_ || keys_->bytes() < bytes) {
     keys_.reset();

@@ -3,7 +3,7 @@
 #define VK_NO_PROTOTYPES
 #include <vulkan/vulkan.h>
 
-// What of an instance and of a device is called, without its vk.
+// The functions of an instance and of a device that hpr calls, without the prefix vk.
 #define HPR_VULKAN_INSTANCE_FUNCTIONS(X)    \
   X(DestroyInstance)                        \
   X(EnumeratePhysicalDevices)               \

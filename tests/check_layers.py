@@ -28,10 +28,11 @@ ALLOWED = {
     "compositing": ["core", "image", "cluster/transport"],
     "rt": ["core", "image", "scene", "cluster/transport"],
     "walls": ["core", "image", "scene", "cluster/transport"],
-    "engine": ["core", "image", "scene", "cluster/transport", "cluster/distribution", "raster", "compositing", "rt"],
+    "engine": ["core", "image", "scene", "cluster/transport", "cluster/distribution", "raster", "compositing", "rt",
+               "gpu"],
 }
 ALLOWED["engine/wall"] = ALLOWED["engine"] + ["engine", "walls"]
-ALLOWED["app"] = ALLOWED["engine/wall"] + ["engine/wall", "gpu"]
+ALLOWED["app"] = ALLOWED["engine/wall"] + ["engine/wall"]
 ALLOWED["app/commands"] = ALLOWED["app"] + ["app"]
 ALLOWED["tools"] = ALLOWED["app"] + ["app"]
 ALLOWED["tests"] = ALLOWED["tools"] + ["tools", "app/commands"]

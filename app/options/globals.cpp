@@ -52,8 +52,14 @@ void Globals::declare(const OptionSet& options) {
       .range(1, 1024)
       .group(everywhere);
   options.option("--seed", seed, "of everything random").check(whole_number_problem).show_default().group(everywhere);
-  options.option("--backend", backend, "OpenGL by: auto, egl, osmesa").show_default().group(everywhere);
-  options.option("--device", device, "EGL device (default: by local rank)").range(0, 1023).group(everywhere);
+  options
+      .option("--backend", backend,
+              "what draws: OpenGL by auto, egl or osmesa; or vulkan, whose devices make the keys by rays")
+      .show_default()
+      .group(everywhere);
+  options.option("--device", device, "device of EGL or Vulkan (default: by local rank)")
+      .range(0, 1023)
+      .group(everywhere);
   options.option("--progress", progress, "auto, bar, line or none")
       .choices({"auto", "bar", "line", "none"})
       .show_default()

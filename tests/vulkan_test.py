@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""`--backend vulkan`: the keys of a device are those of Embree's rays, whoever draws what, and what a device cannot do is done or said.
+
+usage: vulkan_test.py HPR
+
+Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
+"""
+
+import json
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+
+from program import HPR, expect, failures
+
+SIZE = (96, 72)
+OTHERS = 0.0005  # of the pixels may show another surface
+SCENES = ("gen:cornell", "gen:gallery", "gen:sphereflake?s=2", "gen:tetra?s=5", "gen:asteroids", "gen:extensions", "gen:cloud?count=2000")
+SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "4") for distribution in ("sort-first", "sort-last", "hybrid")]
+
+
+def hpr(folder, *arguments, code=0):
+    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    expect(result.returncode == code, f"{' '.join(arguments)}: left with {result.returncode}: {result.stderr[-800:]}")
+    return result
+
+
+def render(folder, scene, *arguments):
+    """The bytes of the keys and of the picture."""
+    hpr(folder, "render", scene, "--size", f"{SIZE[0]}x{SIZE[1]}", "--photons", "2000", "--raw", "a.keys", "-o", "a.exr", "--force", *arguments)
+    return (folder / "a.keys").read_bytes(), (folder / "a.exr").read_bytes()
+
+
+def surfaces(keys):
+    return [~key & 0xFFFFFFFF for key in struct.unpack(f"<{SIZE[0] * SIZE[1]}Q", keys)]
+
+
+def has_device(folder):
+    findings = json.loads(subprocess.run([HPR, "doctor", "--json"], cwd=folder, capture_output=True, text=True, timeout=120, check=False).stdout)["findings"]
+    return next(finding for finding in findings if finding["name"] == "Vulkan")["status"] == "ok"
+
+
+def keys_of_scenes(folder):
+    for scene in SCENES:
+        expected = surfaces(render(folder, scene, "--primary", "rays")[0])
+        found = surfaces(render(folder, scene, "--backend", "vulkan")[0])
+        others = sum(a != b for a, b in zip(found, expected))
+        expect(others <= OTHERS * len(found), f"{scene}: {others} of {len(found)} pixels show another surface than Embree's")
+        expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
+
+
+def spreads(folder):
+    alone = render(folder, "gen:gallery", "--backend", "vulkan", "--spp", "2")
+    for spread in SPREADS:
+        expect(render(folder, "gen:gallery", "--backend", "vulkan", "--spp", "2", *spread) == alone, f"other bits with {' '.join(spread)}")
+
+
+def said_and_done(folder):
+    said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "b.png", "--backend", "vulkan", "--explain")
+    words = said.stdout + said.stderr
+    expect("primary: rays (by " in words and "--backend vulkan" in words, f"does not say who makes the keys: {words[-800:]}")
+    said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "c.png", "--backend", "vulkan", "--device", "99", code=2)
+    expect("there is no Vulkan device 99" in said.stderr and "0: " in said.stderr, f"device 99: {said.stderr}")
+    # What devices do not do is done by Embree or OpenGL, and looks the same.
+    plain = render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned")
+    expect(render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned", "--backend", "vulkan") == plain, "parts of scenes")
+    few = ("--spp", "20", "--adaptive", "--primary", "rays")
+    expect(render(folder, "gen:cornell", *few, "--backend", "vulkan")[1] == render(folder, "gen:cornell", *few)[1], "adaptive samples")
+    drawn = ("--primary", "raster", "--depth-format", "24")
+    expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan") == render(folder, "gen:cornell", *drawn), "OpenGL beside Vulkan")
+    hpr(folder, "wall", "run", "2x1@64x48", "gen:cornell", "-o", "wall", "--frames", "2", "--backend", "vulkan", "--ranks", "2")
+    expect((folder / "wall" / "wall.png").exists(), "a wall has no picture")
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="hpr-vulkan-") as scratch:
+        folder = pathlib.Path(scratch)
+        if not has_device(folder):
+            print("Vulkan has no device here that can do hpr's work")
+            return 77
+        keys_of_scenes(folder)
+        spreads(folder)
+        said_and_done(folder)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
