@@ -46,7 +46,9 @@ void prepare(Session& session, const FramePlan& plan) {
     if (session.scene().part_pages) {
       session.partition_rays(plan.rays);  // pages come as they are drawn
     } else if (plan.primary == Primary::Rays) {
-      if (session.gpu_primary_rays(plan.mine.objects) == nullptr) {
+      if (plan.keys_on_device) {
+        (void)session.gpu_primary_rays(plan.mine.objects);
+      } else {
         (void)session.primary_rays(plan.mine.objects, plan.rays);
       }
     } else {
@@ -80,23 +82,19 @@ void rasterize_objects(Session& session, const FramePlan& plan, std::span<const 
   }
 }
 
-/// trace_primary(), on a device; false where that cannot: where rays go through points or pixels are left out.
-bool trace_on_device(Session& session, const FramePlan& plan, std::span<const SurfaceRange> objects,
-                     std::span<const JitteredViews> jittered, std::span<TileLayer<Key>* const> keys, FrameWork& work) {
-  const auto has_points = [](const View& view) { return view.points.has_value(); };
-  if (jittered.front().sample.wanted != nullptr || std::ranges::any_of(jittered.front().views, has_points))
-    return false;
-  GpuPrimaryRays* const device = session.gpu_primary_rays(objects);
-  if (device == nullptr) return false;
+/// trace_primary(), on a device.
+void trace_on_device(Session& session, const FramePlan& plan, std::span<const JitteredViews> jittered,
+                     std::span<TileLayer<Key>* const> keys, FrameWork& work) {
+  GpuPrimaryRays& device = session.gpu_primary_rays(plan.mine.objects);
   const trace::Span span("primary rays, on the device");
   const Stopwatch watch;
   for (std::size_t screen = 0; screen < plan.layout.screens(); ++screen) {
     const std::vector<Rect> parts = parts_of(plan.mine.area, screen);
-    for (std::size_t i = 0; i < jittered.size(); ++i) device->draw(jittered[i].views[screen], screen, parts, *keys[i]);
+    for (std::size_t i = 0; i < jittered.size(); ++i) device.draw(jittered[i].views[screen], screen, parts, *keys[i]);
   }
-  session.balance().add_keys(plan.layout, plan.tiles, watch.ms());  // what each tile took of it is not known
-  work.keys_ms += watch.ms();
-  return true;
+  const double ms = watch.ms() * session.threads();  // what each tile took of it is not known
+  session.balance().add_keys(plan.layout, plan.tiles, ms);
+  work.keys_ms += ms;
 }
 
 /// trace_primary(), through some of this rank's objects.
@@ -136,8 +134,11 @@ PrimaryRayStats trace_primary(Session& session, const FramePlan& plan, std::span
                               std::span<TileLayer<Key>* const> keys, FrameWork& work) {
   session.partition_rays(plan.rays);
   PrimaryRayStats stats;
+  if (plan.keys_on_device && jittered.front().sample.wanted == nullptr) {  // devices leave out no pixels
+    trace_on_device(session, plan, jittered, keys, work);
+    return stats;
+  }
   session.draw_pages(plan.mine.objects, [&](std::span<const SurfaceRange> objects) {
-    if (trace_on_device(session, plan, objects, jittered, keys, work)) return;
     stats += trace_objects(session, plan, objects, jittered, keys, work);
   });
   return stats;

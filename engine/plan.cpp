@@ -333,11 +333,12 @@ void partition(const Session& session, FramePlan& plan) {
 PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, const FramePlan& plan,
                                std::span<const View> views) {
   const bool rounds_depth = settings.depth_format != DepthFormat::Float32;
-  const std::string gpu = rounds_depth ? "" : session.gpu_of_keys();
-  if (settings.primary != Primary::Auto) {
-    return {settings.primary, gpu.empty() || settings.primary == Primary::Raster ? "as asked" : "as asked, by " + gpu};
+  const bool has_points = std::ranges::any_of(views, [](const View& view) { return view.points.has_value(); });
+  const std::string gpu = rounds_depth || has_points ? "" : session.gpu_of_keys();
+  if (!gpu.empty() && settings.primary != Primary::Raster) {
+    return {Primary::Rays, fmt::format("by {}, as asked by --backend vulkan", gpu), true};
   }
-  if (!gpu.empty()) return {Primary::Rays, "by " + gpu + ", as asked by --backend vulkan"};
+  if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
   KeyWork work{.triangles = session.scene().triangles,
                .own_triangles = mesh_triangles(session.scene()),
                .single_picture = settings.single_picture};
@@ -472,6 +473,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   FramePlan plan = plan_of(settings, views);
   const PrimaryChoice primary = primary_of_frame(session, settings, plan, views);
   plan.primary = primary.primary;
+  plan.keys_on_device = primary.on_device;
   plan.groups = groups_of(settings, session.scene(), ranks);
   const DistributionChoice choice = choose_distribution(session, settings, plan, views);
   plan.distribution = choice.distribution;

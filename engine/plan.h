@@ -28,6 +28,7 @@ struct FramePlan {
   int groups = 1;
   std::string strategy;
   Primary primary = Primary::Raster;  ///< never Auto
+  bool keys_on_device = false;        ///< rays by the session's gpu_primary_rays()
   DepthFormat depth_format = DepthFormat::Float32;
   Shading shading = Shading::Deferred;
   RaySettings rays;
@@ -74,6 +75,7 @@ struct KeyWork {
 struct PrimaryChoice {
   Primary primary = Primary::Raster;  ///< never Auto
   std::string why;
+  bool on_device = false;  ///< see FramePlan::keys_on_device
 };
 
 /// What Primary::Auto stands for. On a GPU OpenGL makes the keys. On a CPU it takes a time for each triangle and rays

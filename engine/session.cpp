@@ -96,20 +96,28 @@ void Session::start_vulkan() {
     const trace::Span span("start Vulkan");
     // Who names Vulkan is content with a device on the CPU.
     gpu_primary_rays_ = std::make_unique<GpuPrimaryRays>(
-        GpuOptions{.device = settings_.device, .local_rank = host_.local_rank, .software = true});
+        GpuOptions{.device = settings_.device, .local_rank = host_.local_rank, .software = true}, host_.threads);
   });
   const GpuInfo& device = gpu_primary_rays_->info();
   log::debug("Vulkan: {}, {}", device.name, device.driver);
+  const auto by_cpu = all_gather_value(comm_, device.software ? 1 : 0);
   if (comm_.rank() != 0) return;
-  if (device.software) log::warning("Vulkan has no GPU here: {} does its work on the CPU, slowly", device.name);
+  std::vector<std::size_t> ranks;
+  for (std::size_t rank = 0; rank < by_cpu.size(); ++rank) {
+    if (by_cpu[rank] != 0) ranks.push_back(rank);
+  }
+  if (!ranks.empty()) {
+    log::warning("Vulkan has no GPU for {} {}: the CPU does its work, slowly", ranks.size() == 1 ? "rank" : "ranks",
+                 fmt::join(ranks, ", "));
+  }
   if (!fits_on_gpu(scene_)) log::warning("Embree makes the keys: no device takes parts of scenes");
 }
 
-GpuPrimaryRays* Session::gpu_primary_rays(std::span<const SurfaceRange> objects) {
-  if (!gpu_primary_rays_ || !fits_on_gpu(scene_)) return nullptr;
+GpuPrimaryRays& Session::gpu_primary_rays(std::span<const SurfaceRange> objects) {
+  HPR_CHECK(gpu_primary_rays_ && fits_on_gpu(scene_));
   const trace::Span span("scene to device");
   gpu_primary_rays_->hold(scene_, objects);
-  return gpu_primary_rays_.get();
+  return *gpu_primary_rays_;
 }
 
 std::string Session::gpu_of_keys() const {

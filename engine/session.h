@@ -100,11 +100,11 @@ class Session {
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
-  /// The device that makes these keys in place of primary_rays(), with `objects` on it; null where settings name none,
-  /// or it has no room for parts of scenes.
-  [[nodiscard]] GpuPrimaryRays* gpu_primary_rays(std::span<const SurfaceRange> objects);
-  /// Its name, where it will be asked; empty: none.
+  /// The name of the device that can make keys in place of primary_rays(); empty: settings name none, or the scene is
+  /// in parts, which devices do not take.
   [[nodiscard]] std::string gpu_of_keys() const;
+  /// That device, with `objects` on it.
+  [[nodiscard]] GpuPrimaryRays& gpu_primary_rays(std::span<const SurfaceRange> objects);
   /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where
   /// rays meet a part of the scene.
   [[nodiscard]] Rasterizer& whole_rasterizer();

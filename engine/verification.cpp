@@ -14,6 +14,7 @@
 #include "core/timing.h"
 #include "engine/session.h"
 #include "engine/tile_ownership.h"
+#include "gpu/gpu_primary_rays.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
 #include "rt/trace/primary_rays.h"
@@ -314,6 +315,11 @@ void draw_keys(Session& session, const FramePlan& plan, std::span<const Jittered
     if (parts.empty()) continue;
     std::vector<View> views;
     for (const JitteredViews& each : jittered) views.push_back(each.views[screen]);
+    if (plan.keys_on_device && wanted == nullptr) {
+      GpuPrimaryRays& device = session.gpu_primary_rays(covering_surfaces(session.scene(), false));
+      for (std::size_t i = 0; i < views.size(); ++i) device.draw(views[i], screen, parts, *keys[i]);
+      continue;
+    }
     if (plan.primary == Primary::Rays) {
       session.whole_primary_rays(plan.rays).draw(views, screen, parts, keys, wanted);
       continue;

@@ -1,5 +1,7 @@
 #include "gpu/bvh.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -112,7 +114,20 @@ struct BvhEnd {
 
 }  // namespace
 
-Bvh build_bvh(std::span<const FloatBox> boxes) {
+struct BvhBuilder::Embree {
+  std::unique_ptr<std::remove_pointer_t<RTCDevice>, DeviceEnd> device;
+};
+
+BvhBuilder::BvhBuilder(int threads) : embree_(std::make_unique<Embree>()) {
+  embree_->device.reset(rtcNewDevice(fmt::format("threads={}", threads).c_str()));
+  if (!embree_->device) {
+    throw Error(ExitCode::NoDevice, "Embree does not start", "hpr doctor says what this machine has");
+  }
+}
+
+BvhBuilder::~BvhBuilder() = default;
+
+Bvh BvhBuilder::build(std::span<const FloatBox> boxes) const {
   Bvh built;
   std::vector<RTCBuildPrimitive> primitives;
   primitives.reserve(boxes.size());
@@ -132,9 +147,7 @@ Bvh build_bvh(std::span<const FloatBox> boxes) {
     primitive.primID = static_cast<unsigned int>(i);
   }
   if (primitives.empty()) return built;
-  const std::unique_ptr<std::remove_pointer_t<RTCDevice>, DeviceEnd> device(rtcNewDevice(nullptr));
-  if (!device) throw Error(ExitCode::NoDevice, "Embree does not start", "hpr doctor says what this machine has");
-  const std::unique_ptr<std::remove_pointer_t<RTCBVH>, BvhEnd> bvh(rtcNewBVH(device.get()));
+  const std::unique_ptr<std::remove_pointer_t<RTCBVH>, BvhEnd> bvh(rtcNewBVH(embree_->device.get()));
   RTCBuildArguments arguments = rtcDefaultBuildArguments();
   arguments.byteSize = sizeof(arguments);
   arguments.buildQuality = RTC_BUILD_QUALITY_MEDIUM;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -31,9 +32,21 @@ struct Bvh {
   std::vector<std::uint32_t> items;  ///< indices of boxes, leaf after leaf
 };
 
-/// Boxes that hold nothing (low > high), or are not finite, are left out. Takes all of this machine's cores for many.
-/// Throws Error (Limit) where memory ends.
-[[nodiscard]] Bvh build_bvh(std::span<const FloatBox> boxes);
+/// Builds trees, with Embree's threads.
+class BvhBuilder {
+ public:
+  explicit BvhBuilder(int threads);
+  ~BvhBuilder();
+  BvhBuilder(const BvhBuilder&) = delete;
+  BvhBuilder& operator=(const BvhBuilder&) = delete;
+
+  /// Boxes that hold nothing (low > high), or are not finite, are left out. Throws Error (Limit) where memory ends.
+  [[nodiscard]] Bvh build(std::span<const FloatBox> boxes) const;
+
+ private:
+  struct Embree;
+  std::unique_ptr<Embree> embree_;
+};
 
 /// How deep trees get: what a shader's stack holds.
 inline constexpr std::uint32_t kMaxBvhDepth = 48;

@@ -370,6 +370,7 @@ void GpuDevice::check(VkResult result, std::string_view doing) const {
                   "see what the system's log says of it (dmesg); start again, or leave the work to the CPU");
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
     case VK_ERROR_OUT_OF_HOST_MEMORY:
+    case VK_ERROR_TOO_MANY_OBJECTS:
       throw Error(ExitCode::Limit, fmt::format("{} has no memory left while {}", who, doing),
                   fmt::format("it has {} of its own: give it less, or end other programs that use it",
                               format_bytes(info_.memory)));

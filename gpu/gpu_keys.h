@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "gpu/gpu_batch.h"
@@ -25,18 +26,23 @@ class GpuKeys {
  public:
   explicit GpuKeys(const GpuDevice& device);
 
-  /// The keys of a view, which has no points (View::points), as large as it.
+  /// The keys of a view, which has no points (View::points), as large as it. Throws Error: Limit where a software
+  /// device gives up a ray that meets too much.
   [[nodiscard]] Image<Key> draw(const GpuScene& scene, const View& view);
-  /// What the last draw() took on the device.
-  [[nodiscard]] const std::vector<GpuPassTime>& times() const { return batch_.times(); }
+  /// What the last draw() took on the device; 0 where that has no clock.
+  [[nodiscard]] const std::vector<GpuPassTime>& times() const { return times_; }
 
  private:
+  /// Some rows of it.
+  void draw_band(const GpuScene& scene, const View& band, std::span<Key> pixels);
+
   const GpuDevice& device_;
   GpuKernel kernel_;
   GpuBuffer view_;
   std::optional<GpuBuffer> keys_;
   std::optional<GpuBuffer> read_;
   GpuBatch batch_;
+  std::vector<GpuPassTime> times_;
 };
 
 }  // namespace hpr

@@ -61,7 +61,7 @@ class GpuKeysTest : public test::OnGpu {
  protected:
   void expect_as_embree(const Scene& scene, const View& view, const std::string& what, double others = 5e-4) {
     SCOPED_TRACE(what);
-    const GpuScene placed(device(), scene, covering_surfaces(scene, false));
+    const GpuScene placed(device(), scene, covering_surfaces(scene, false), 2);
     const Image<Key> found = GpuKeys(device()).draw(placed, view);
     const Differences off = between(found, keys_by_embree(scene, view));
     const auto pixels = static_cast<double>(found.pixels().size());
@@ -164,9 +164,60 @@ TEST_F(GpuKeysTest, SurfacesOfOneDepthAreThoseOfEmbree) {
   expect_as_embree(scene, view, "orthographic");
 }
 
+TEST_F(GpuKeysTest, ClosedSurfacesHaveNoHolesFromAfar) {
+  Scene scene;
+  const std::uint32_t grey = add_material(scene, test::diffuse());
+  place_mesh(scene, add_mesh(scene, sphere(1.0, 160, grey)),
+             glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0.3, 1.0, 0.1)));
+  finish_scene(scene);
+  for (const double distance : {5.0, 1e4, 1e6}) {
+    expect_as_embree(scene,
+                     test::view_from({0, 0.6 * distance, 0.8 * distance}, {0, 0, 0}, {96, 72}, scene, 2.0 / distance),
+                     std::to_string(distance), 0.0);
+  }
+}
+
+/// More pixels than are drawn at once.
+TEST_F(GpuKeysTest, LargeScreensAreDrawnInPieces) {
+  const Scene scene = load_scene("gen:cornell");
+  expect_as_embree(scene, make_view(scene.cameras.front(), {500, 301}, scene.bounds), "cornell");
+}
+
+/// A software device ends a thread's loops in silence.
+TEST_F(GpuKeysTest, ARayThatMeetsTooMuchIsAnErrorAndNotAHole) {
+  Scene scene;
+  const std::uint32_t wall =
+      add_mesh(scene, quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, add_material(scene, test::diffuse())));
+  for (int i = 0; i < 40'000; ++i) place_mesh(scene, wall);
+  finish_scene(scene);
+  const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {8, 8}, scene, 0.3);
+  try {
+    const Image<Key> keys = GpuKeys(device()).draw(GpuScene(device(), scene, covering_surfaces(scene, false), 2), view);
+    for (const Key key : keys.pixels()) ASSERT_LT(key_surface(key), 2U);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::Limit) << error.what();
+    EXPECT_TRUE(device().info().software);
+  }
+}
+
+TEST(GpuScene, WhatFlattensHasNoInverse) {
+  glm::dmat3 matrix(1.0);
+  EXPECT_TRUE(usable_inverse(matrix));
+  matrix[2][2] = 1e-3;
+  ASSERT_TRUE(usable_inverse(matrix));
+  EXPECT_DOUBLE_EQ((*usable_inverse(matrix))[2][2], 1e3);
+  matrix[2][2] = 1e-8;
+  EXPECT_FALSE(usable_inverse(matrix));
+  matrix[2][2] = 0.0;
+  EXPECT_FALSE(usable_inverse(matrix));
+  EXPECT_FALSE(usable_inverse(glm::dmat3(0.0)));
+  matrix[2] = matrix[1];
+  EXPECT_FALSE(usable_inverse(matrix));
+}
+
 TEST_F(GpuKeysTest, ABlockOfAScreenHasTheKeysOfTheWhole) {
   const Scene scene = placed_in_many_ways();
-  const GpuScene placed(device(), scene, covering_surfaces(scene, false));
+  const GpuScene placed(device(), scene, covering_surfaces(scene, false), 2);
   View view = test::view_from({0, 0.2, 8}, {0, 0, 0}, {100, 80}, scene);
   GpuKeys drawer(device());
   const Image<Key> whole = drawer.draw(placed, view);
@@ -183,13 +234,13 @@ TEST_F(GpuKeysTest, HoweverSurfacesAreDealtOutTheLargestKeysAreThoseOfAll) {
       make_view(scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front(), {96, 72}, scene.bounds);
   GpuKeys drawer(device());
   const std::vector<SurfaceRange> all = covering_surfaces(scene, false);
-  const Image<Key> expected = drawer.draw(GpuScene(device(), scene, all), view);
+  const Image<Key> expected = drawer.draw(GpuScene(device(), scene, all, 2), view);
   Image<Key> largest(view.size());
   constexpr std::uint32_t kParts = 3;
   for (std::uint32_t part = 0; part < kParts; ++part) {
     const SurfaceRange of{scene.triangles / kParts * part,
                           part + 1 == kParts ? scene.triangles : scene.triangles / kParts * (part + 1)};
-    const Image<Key> keys = drawer.draw(GpuScene(device(), scene, common_ranges(all, {of})), view);
+    const Image<Key> keys = drawer.draw(GpuScene(device(), scene, common_ranges(all, {of}), 2), view);
     for (std::size_t i = 0; i < keys.pixels().size(); ++i)
       largest.pixels()[i] = std::max(largest.pixels()[i], keys.pixels()[i]);
   }
@@ -204,7 +255,7 @@ TEST_F(GpuKeysTest, OfSurfacesAtOnePlaceTheLowestIdStays) {
   for (int i = 0; i < 40; ++i) place_mesh(scene, wall);
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {64, 64}, scene, 0.3);
-  const Image<Key> keys = GpuKeys(device()).draw(GpuScene(device(), scene, covering_surfaces(scene, false)), view);
+  const Image<Key> keys = GpuKeys(device()).draw(GpuScene(device(), scene, covering_surfaces(scene, false), 2), view);
   for (const Key key : keys.pixels()) ASSERT_LT(key_surface(key), 2U);
 }
 
@@ -214,7 +265,7 @@ TEST_F(GpuKeysTest, NothingIsSeenOfNothing) {
   finish_scene(scene);
   const View view = test::view_from({0, 0, 3}, {0, 0, 0}, {20, 10}, scene);
   for (const std::vector<SurfaceRange>& objects : {std::vector<SurfaceRange>{}, covering_surfaces(scene, false)}) {
-    const Image<Key> keys = GpuKeys(device()).draw(GpuScene(device(), scene, objects), view);
+    const Image<Key> keys = GpuKeys(device()).draw(GpuScene(device(), scene, objects, 2), view);
     for (const Key key : keys.pixels()) ASSERT_EQ(key, kNoKey);
   }
 }
@@ -232,7 +283,7 @@ TEST(Bvh, HoldsEveryBoxOnceInBoxesThatHoldIt) {
     }
     boxes.push_back({{1, 1, 1}, {0, 2, 2}});  // empty
     boxes.push_back({{0, 0, 0}, {std::numeric_limits<float>::infinity(), 1, 1}});
-    const Bvh bvh = build_bvh(boxes);
+    const Bvh bvh = BvhBuilder(2).build(boxes);
     std::vector<int> found(boxes.size());
     const auto check = [&](const auto& self, std::uint32_t at, std::uint32_t depth) -> void {
       const BvhNode& node = bvh.nodes.at(at);

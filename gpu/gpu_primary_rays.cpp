@@ -1,20 +1,24 @@
 #include "gpu/gpu_primary_rays.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/error.h"
 
 namespace hpr {
 
 void GpuPrimaryRays::hold(const Scene& scene, std::span<const SurfaceRange> objects) {
-  if (scene_ && std::ranges::equal(objects, objects_)) return;
-  release();
-  scene_.emplace(device_, scene, objects);
-  objects_.assign(objects.begin(), objects.end());
+  const auto has = [&](const Held& held) { return held.scene && std::ranges::equal(objects, held.objects); };
+  if (has(held_.front())) return;
+  std::swap(held_.front(), held_.back());
+  if (has(held_.front())) return;
+  held_.front().scene.reset();  // frees its memory before the next one takes some
+  held_.front().scene = std::make_unique<GpuScene>(device_, scene, objects, threads_);
+  held_.front().objects.assign(objects.begin(), objects.end());
 }
 
 void GpuPrimaryRays::release() {
-  scene_.reset();
+  for (Held& held : held_) held.scene.reset();
 }
 
 namespace {
@@ -49,13 +53,13 @@ bool merge(const Rect& pixels, const Rect& tile_pixels, const Image<Key>& keys, 
 }  // namespace
 
 void GpuPrimaryRays::draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer) {
-  HPR_CHECK(scene_ && layer.depth_format() == DepthFormat::Float32);
+  HPR_CHECK(held_.front().scene && layer.depth_format() == DepthFormat::Float32);
   const FrameLayout& layout = layer.layout();
   const Rect box = box_about(parts, view);  // the device draws all of it
   if (box.empty()) return;
   View boxed = view;
   boxed.block = {view.block.x0 + box.x0, view.block.y0 + box.y0, view.block.x0 + box.x1, view.block.y0 + box.y1};
-  const Image<Key> keys = keys_.draw(*scene_, boxed);
+  const Image<Key> keys = keys_.draw(*held_.front().scene, boxed);
   for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
     const TilePlace place = layout.place(tile);
     const Rect drawn = place.screen == screen ? intersection(place.pixels, box) : Rect{};

@@ -1,7 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <optional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,11 +19,13 @@ namespace hpr {
 /// A device that makes a rank's keys, with the surfaces it holds from frame to frame.
 class GpuPrimaryRays {
  public:
-  explicit GpuPrimaryRays(const GpuOptions& options) : device_(options), keys_(device_) {}
+  /// `threads` build what is put on it.
+  GpuPrimaryRays(const GpuOptions& options, int threads) : device_(options), threads_(threads), keys_(device_) {}
 
   [[nodiscard]] const GpuInfo& info() const { return device_.info(); }
 
-  /// Puts `objects` on the device; nothing where it has them. Throws Error (Limit) where its memory ends.
+  /// Draws `objects` from here on. Puts them on the device where it has not got them, and keeps those it drew before.
+  /// Throws Error (Limit) where its memory ends.
   void hold(const Scene& scene, std::span<const SurfaceRange> objects);
   /// Frees what it holds: the scene changes.
   void release();
@@ -33,9 +36,13 @@ class GpuPrimaryRays {
 
  private:
   GpuDevice device_;
+  int threads_;
   GpuKeys keys_;
-  std::vector<SurfaceRange> objects_;
-  std::optional<GpuScene> scene_;
+  struct Held {
+    std::vector<SurfaceRange> objects;
+    std::unique_ptr<GpuScene> scene;
+  };
+  std::array<Held, 2> held_;  ///< the first one is drawn
 };
 
 /// Whether a device can make a scene's keys: all meshes are here whole.

@@ -45,11 +45,17 @@ struct GpuSceneTree {
 };
 static_assert(sizeof(GpuSceneTree) == 56);
 
-/// A tree on the device.
+/// A tree among others: where its nodes and items begin, and its root.
 struct PlacedTree {
-  std::uint64_t nodes = 0;
-  std::uint64_t items = 0;
+  std::size_t nodes = 0;
+  std::size_t items = 0;
   BvhNode root;
+};
+
+/// A mesh among others: where its arrays begin.
+struct PlacedMesh {
+  std::size_t positions = 0;
+  std::size_t triangles = 0;
 };
 
 float largest_of(const BvhNode& root) {
@@ -72,26 +78,11 @@ FloatBox rounded(const Bounds& box) {
   return about;
 }
 
-/// A matrix that undoes `linear`; none where that flattens what it places, or nearly so: boxes in the mesh's own
-/// coordinates would lose all digits.
-std::optional<glm::dmat3> inverse_of(const glm::dmat3& linear) {
-  constexpr double kMaxCondition = 1e6;
-  const glm::dmat3 inverse = glm::inverse(linear);
-  double size = 0.0;
-  double inverse_size = 0.0;
-  for (int column = 0; column < 3; ++column) {
-    size = std::max(size, glm::length(linear[column]));
-    inverse_size = std::max(inverse_size, glm::length(inverse[column]));
-  }
-  if (!(size * inverse_size < kMaxCondition)) return std::nullopt;  // nor where that is no number
-  return inverse;
-}
-
-/// Puts a scene on a device, buffer by buffer.
+/// Puts a scene on a device: all of a kind in one buffer, as devices have few.
 class Builder {
  public:
-  Builder(const GpuDevice& device, const Scene& scene, std::vector<GpuBuffer>& buffers)
-      : device_(device), scene_(scene), buffers_(buffers), batch_(device) {
+  Builder(const GpuDevice& device, const Scene& scene, int threads, std::vector<GpuBuffer>& buffers)
+      : device_(device), scene_(scene), bvhs_(threads), buffers_(buffers), batch_(device) {
     tree_.center = 0.5 * scene.bounds.low + 0.5 * scene.bounds.high;
   }
 
@@ -99,7 +90,7 @@ class Builder {
     const Instance& instance = scene_.instances[part.instance];
     const Mesh& mesh = scene_.mesh_of(instance);
     const glm::dmat3 linear(instance.to_world);
-    const std::optional<glm::dmat3> inverse = inverse_of(linear);
+    const std::optional<glm::dmat3> inverse = usable_inverse(linear);
     const std::optional<PlacedTree> placed = inverse ? shared_tree(instance, part) : tree_in_world(instance, part);
     if (!placed) return;
 
@@ -109,9 +100,9 @@ class Builder {
     }
     made.to_boxes = inverse.value_or(glm::dmat3(1.0));
     made.box_origin = inverse ? glm::dvec3(instance.to_world[3]) : tree_.center;
-    const auto& [positions, triangles] = arrays_of(instance.mesh);
-    made.positions = positions;
-    made.triangles = triangles;
+    const PlacedMesh& arrays = placed_mesh(instance.mesh);
+    made.positions = arrays.positions;
+    made.triangles = arrays.triangles;
     made.nodes = placed->nodes;
     made.items = placed->items;
     made.first_surface = instance.first_surface;
@@ -126,11 +117,21 @@ class Builder {
   }
 
   void finish() {
-    const Bvh bvh = build_bvh(boxes_);
+    const Bvh bvh = bvhs_.build(boxes_);
     if (!bvh.nodes.empty()) {
       const PlacedTree placed = place(bvh);
-      tree_.nodes = placed.nodes;
-      tree_.items = placed.items;
+      const std::uint64_t nodes = upload(std::span<const BvhNode>(nodes_));
+      const std::uint64_t items = upload(std::span<const std::uint32_t>(items_));
+      const std::uint64_t positions = upload(std::span<const glm::vec3>(positions_));
+      const std::uint64_t triangles = upload(std::span<const glm::uvec3>(triangles_));
+      for (GpuInstance& instance : instances_) {  // from indices to addresses
+        instance.nodes = nodes + instance.nodes * sizeof(BvhNode);
+        instance.items = items + instance.items * sizeof(std::uint32_t);
+        instance.positions = positions + instance.positions * sizeof(glm::vec3);
+        instance.triangles = triangles + instance.triangles * sizeof(glm::uvec3);
+      }
+      tree_.nodes = nodes + placed.nodes * sizeof(BvhNode);
+      tree_.items = items + placed.items * sizeof(std::uint32_t);
       tree_.instances = upload(std::span<const GpuInstance>(instances_));
       tree_.largest = largest_of(placed.root);
       tree_.is_empty = 0;
@@ -143,24 +144,24 @@ class Builder {
   template <typename T>
   std::uint64_t upload(std::span<const T> values) {
     const auto bytes = std::as_bytes(values);
-    const GpuBuffer staging(device_, bytes.size(), GpuMemory::Upload);
-    std::memcpy(staging.mapped().data(), bytes.data(), bytes.size());
+    staging_.emplace(device_, bytes.size(), GpuMemory::Upload);
+    std::memcpy(staging_->mapped().data(), bytes.data(), bytes.size());
     const GpuBuffer& there = buffers_.emplace_back(device_, bytes.size(), GpuMemory::Device);
-    batch_.copy(staging, there, bytes.size());
+    batch_.copy(*staging_, there, bytes.size());
     batch_.submit();
     batch_.wait();
+    staging_.reset();
     return there.address();
   }
 
   PlacedTree place(const Bvh& bvh) {
-    PlacedTree placed;
-    placed.nodes = upload(std::span<const BvhNode>(bvh.nodes));
-    placed.items = upload(std::span<const std::uint32_t>(bvh.items));
-    placed.root = bvh.nodes.front();
+    const PlacedTree placed{nodes_.size(), items_.size(), bvh.nodes.front()};
+    nodes_.insert(nodes_.end(), bvh.nodes.begin(), bvh.nodes.end());
+    items_.insert(items_.end(), bvh.items.begin(), bvh.items.end());
     return placed;
   }
 
-  /// A tree of some triangles of a mesh; none where they are none. `at(corner)`: where a vertex lies.
+  /// A tree of some triangles of a mesh; none where they are none. `at(position)`: where boxes have a vertex.
   template <typename At>
   std::optional<PlacedTree> tree_of(const Mesh& mesh, const SurfaceRange& range, const At& at) {
     std::vector<FloatBox> boxes;
@@ -175,7 +176,7 @@ class Builder {
       }
       boxes.push_back(rounded(box));
     }
-    Bvh bvh = build_bvh(boxes);
+    Bvh bvh = bvhs_.build(boxes);
     if (bvh.nodes.empty()) return std::nullopt;
     for (std::uint32_t& item : bvh.items) item += range.first;
     return place(bvh);
@@ -197,37 +198,56 @@ class Builder {
     return tree;
   }
 
-  /// Addresses of positions and triangles.
-  const std::pair<std::uint64_t, std::uint64_t>& arrays_of(std::uint32_t mesh) {
-    const auto known = arrays_.find(mesh);
-    if (known != arrays_.end()) return known->second;
+  const PlacedMesh& placed_mesh(std::uint32_t mesh) {
+    const auto known = meshes_.find(mesh);
+    if (known != meshes_.end()) return known->second;
     const Mesh& of = scene_.meshes[mesh];
-    const std::uint64_t positions = upload(std::span<const glm::vec3>(of.positions));
-    const std::uint64_t triangles = upload(std::span<const glm::uvec3>(of.triangles));
-    return arrays_.emplace(mesh, std::pair(positions, triangles)).first->second;
+    const PlacedMesh placed{positions_.size(), triangles_.size()};
+    positions_.insert(positions_.end(), of.positions.begin(), of.positions.end());
+    triangles_.insert(triangles_.end(), of.triangles.begin(), of.triangles.end());
+    return meshes_.emplace(mesh, placed).first->second;
   }
 
   const GpuDevice& device_;
   const Scene& scene_;
+  BvhBuilder bvhs_;
   std::vector<GpuBuffer>& buffers_;
+  std::optional<GpuBuffer> staging_;  ///< before the batch, which may still read it when it ends
   GpuBatch batch_;
   GpuSceneTree tree_;
   std::vector<GpuInstance> instances_;
   std::vector<FloatBox> boxes_;  ///< of instances, relative to the tree's centre
+  std::vector<BvhNode> nodes_;
+  std::vector<std::uint32_t> items_;
+  std::vector<glm::vec3> positions_;
+  std::vector<glm::uvec3> triangles_;
   std::map<std::array<std::uint32_t, 3>, std::optional<PlacedTree>> trees_;
-  std::map<std::uint32_t, std::pair<std::uint64_t, std::uint64_t>> arrays_;
+  std::map<std::uint32_t, PlacedMesh> meshes_;
 };
 
 }  // namespace
 
-GpuScene::GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects) {
-  Builder builder(device, scene, buffers_);
+GpuScene::GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects, int threads) {
+  Builder builder(device, scene, threads, buffers_);
   const auto ranges = merged_ranges({objects.begin(), objects.end()}, scene.triangles);
   for (const InstanceRange& part : split_by_instance(scene, ranges)) {
     HPR_CHECK(!scene.mesh_of(scene.instances[part.instance]).partial);
     builder.add(part);
   }
   builder.finish();
+}
+
+std::optional<glm::dmat3> usable_inverse(const glm::dmat3& linear) {
+  constexpr double kMaxCondition = 1e6;
+  const glm::dmat3 inverse = glm::inverse(linear);
+  double size = 0.0;
+  double inverse_size = 0.0;
+  for (int column = 0; column < 3; ++column) {
+    size += glm::length(linear[column]);
+    inverse_size += glm::length(inverse[column]);
+  }
+  if (!(size * inverse_size < kMaxCondition)) return std::nullopt;  // nor where that is no number
+  return inverse;
 }
 
 std::size_t GpuScene::bytes() const {

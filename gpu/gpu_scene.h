@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,8 +17,8 @@ namespace hpr {
 class GpuScene {
  public:
   /// `objects`: the surfaces it holds. The whole meshes have to be here (Mesh::partial). Throws Error (Limit) where
-  /// they do not fit into the device's memory.
-  GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects);
+  /// they do not fit into the device's memory. `threads` build its trees.
+  GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects, int threads);
 
   /// As SceneTrees of scene.glsl.
   [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
@@ -26,5 +28,9 @@ class GpuScene {
  private:
   std::vector<GpuBuffer> buffers_;  ///< what others refer to comes before them; the last one is the scene's tree
 };
+
+/// What undoes `linear`; none where that flattens what it places, or nearly so: boxes in a mesh's own coordinates would
+/// lose all digits.
+[[nodiscard]] std::optional<glm::dmat3> usable_inverse(const glm::dmat3& linear);
 
 }  // namespace hpr

@@ -70,6 +70,9 @@ def said_and_done(folder):
     expect(render(folder, "gen:cornell", *few, "--backend", "vulkan")[1] == render(folder, "gen:cornell", *few)[1], "adaptive samples")
     drawn = ("--primary", "raster", "--depth-format", "24")
     expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan") == render(folder, "gen:cornell", *drawn), "OpenGL beside Vulkan")
+    said = hpr(folder, "render", "gen:gallery", "--size", "128x96", "-o", "d.png", "--backend", "vulkan", "--ranks", "3", "--distribute", "sort-last",
+               "--verify", "100")
+    expect("differ" not in said.stderr, f"drawn again, keys are others: {said.stderr[-800:]}")
     hpr(folder, "wall", "run", "2x1@64x48", "gen:cornell", "-o", "wall", "--frames", "2", "--backend", "vulkan", "--ranks", "2")
     expect((folder / "wall" / "wall.png").exists(), "a wall has no picture")
 

@@ -14,17 +14,22 @@ layout(buffer_reference, scalar) readonly buffer Indices {
 };
 const uint kMaxBvhDepth = 48u;
 
-// A ray as boxes are tested against: in single precision, so boxes count as `slack` wider on all sides.
+// A ray as boxes are tested against: in single precision, so boxes count as `slack` wider on all sides. It starts near them,
+// however far off the eye is: there single precision has the digits.
 struct BoxRay {
   vec3 origin;
   vec3 inverse;  // of the direction's components, none of them 0
   float slack;
+  double start;  // multiple of the direction by which the origin was moved
 };
 
 // `largest`: of the coordinates of all boxes it will be tested against.
 BoxRay make_box_ray(dvec3 origin, dvec3 direction, float largest) {
   BoxRay ray;
-  ray.origin = vec3(origin);
+  double squared = dot(direction, direction);
+  double reach = 2.0 * double(largest) / sqrt(squared);  // they lie within sqrt(3) times the largest of the middle
+  ray.start = max(dot(-origin, direction) / squared - reach, double(0.0));
+  ray.origin = vec3(origin + ray.start * direction);
   vec3 along = vec3(direction);
   for (int axis = 0; axis < 3; ++axis) {
     if (abs(along[axis]) < 1e-30) along[axis] = along[axis] < 0.0 ? -1e-30 : 1e-30;
@@ -36,7 +41,7 @@ BoxRay make_box_ray(dvec3 origin, dvec3 direction, float largest) {
   return ray;
 }
 
-// Where the ray enters a box before `limit`, as a multiple of its direction; negative: nowhere.
+// Where the ray enters a box before `limit`, from its start on; negative: nowhere.
 float enters(BoxRay ray, BvhNode node, float limit) {
   vec3 a = (node.low - ray.slack - ray.origin) * ray.inverse;
   vec3 b = (node.high + ray.slack - ray.origin) * ray.inverse;

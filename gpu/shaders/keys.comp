@@ -36,6 +36,8 @@ layout(push_constant, scalar) uniform Constants {
   SceneTrees scene;
 };
 
+const uint64_t kUnfinished = ~0ul;  // of no surface: its depth is no number
+
 struct Ray {
   dvec3 origin;
   dvec3 direction;  // one metre along the view's axis
@@ -76,8 +78,12 @@ struct Found {
   double along;  // metres from the eye along the view's axis
 };
 
-// Barycentric coordinates may be so much off the triangle, for rounding.
-const double kEdge = 1e-12;
+// What rounding may do to barycentric coordinates, so that no ray slips through between two triangles: more where the place is
+// far away for the triangle's size, or seen nearly edge-on.
+double edge_of(dvec3 from_v0, dvec3 direction, dvec3 e1, dvec3 e2, double determinant) {
+  double longest = max(length(e1), length(e2));
+  return min(1e-12 + 1.8e-15 * length(from_v0) * length(direction) * longest / abs(determinant), double(1e-6));
+}
 
 void meet(View view, Ray ray, Instance instance, uint triangle, inout Found found) {
   uvec3 corners = instance.triangles.triangles[triangle];
@@ -95,7 +101,8 @@ void meet(View view, Ray ray, Instance instance, uint triangle, inout Found foun
   if (double(instance.front) * determinant < 0.0) return;
   precise double u = exact_dot(from_v0, p) / determinant;
   precise double v = exact_dot(ray.direction, q) / determinant;
-  if (!(u >= -kEdge && v >= -kEdge && u + v <= 1.0 + kEdge)) return;  // nor where the triangle is seen edge-on
+  double edge = edge_of(from_v0, ray.direction, e1, e2, determinant);
+  if (!(u >= -edge && v >= -edge && u + v <= 1.0 + edge)) return;  // nor where the triangle is seen edge-on
   u = max(u, double(0.0));
   v = max(v, double(0.0));
   precise double sum = max(u + v, double(1.0));
@@ -117,27 +124,29 @@ void meet(View view, Ray ray, Instance instance, uint triangle, inout Found foun
 }
 
 // Up to where other surfaces may have as large a key: what rounds to the same depth, and what single precision adds.
-float limit_of(View view, Found found) {
+// From the start of a box ray on.
+float limit_of(View view, Found found, BoxRay boxes) {
   if (found.key == 0ul) return 3.0e38;
   double step = view.orthographic != 0u ? (view.far_distance - view.near_distance) * 2.4e-7 : double(0.0);
-  return float(found.along + abs(found.along) * 1e-6 + step);
+  return float(found.along + abs(found.along) * 1e-6 + step - boxes.start);
 }
 
-void trace_mesh(View view, Ray ray, Instance instance, inout Found found) {
+// Whether all was looked at: software devices end loops, in silence.
+bool trace_mesh(View view, Ray ray, Instance instance, inout Found found) {
   BoxRay boxes = make_box_ray(instance.to_boxes * (ray.origin - instance.box_origin),
                               instance.to_boxes * ray.direction, instance.largest);
   uint stack[kMaxBvhDepth];
   uint open = 0u;
   uint at = 0u;
-  if (enters(boxes, instance.nodes.nodes[0], limit_of(view, found)) < 0.0) return;
+  if (enters(boxes, instance.nodes.nodes[0], limit_of(view, found, boxes)) < 0.0) return true;
   while (true) {
     BvhNode node = instance.nodes.nodes[at];
     if (node.items > 0u) {
-      for (uint i = 0u; i < node.items; ++i) {
-        meet(view, ray, instance, instance.items.indices[node.first + i], found);
-      }
+      uint i = 0u;
+      for (; i < node.items; ++i) meet(view, ray, instance, instance.items.indices[node.first + i], found);
+      if (i < node.items) return false;
     } else {
-      float limit = limit_of(view, found);
+      float limit = limit_of(view, found, boxes);
       float a = enters(boxes, instance.nodes.nodes[node.first], limit);
       float b = enters(boxes, instance.nodes.nodes[node.first + 1u], limit);
       if (a >= 0.0 && b >= 0.0) {
@@ -150,13 +159,14 @@ void trace_mesh(View view, Ray ray, Instance instance, inout Found found) {
         continue;
       }
     }
-    if (open == 0u) return;
+    if (open == 0u) return true;
     at = stack[--open];
   }
+  return false;
 }
 
-void trace_scene(View view, Ray ray, SceneTree tree, inout Found found) {
-  if (tree.is_empty != 0u) return;
+bool trace_scene(View view, Ray ray, SceneTree tree, inout Found found) {
+  if (tree.is_empty != 0u) return true;
   precise dvec3 origin = ray.origin - tree.center;
   BoxRay boxes = make_box_ray(origin, ray.direction, tree.largest);
   uint stack[kMaxBvhDepth];
@@ -164,13 +174,15 @@ void trace_scene(View view, Ray ray, SceneTree tree, inout Found found) {
   uint at = 0u;
   while (true) {
     BvhNode node = tree.nodes.nodes[at];
-    bool meets = enters(boxes, node, limit_of(view, found)) >= 0.0;
+    bool meets = enters(boxes, node, limit_of(view, found, boxes)) >= 0.0;
     if (meets && node.items > 0u) {
-      for (uint i = 0u; i < node.items; ++i) {
-        trace_mesh(view, ray, tree.instances.instances[tree.items.indices[node.first + i]], found);
+      uint i = 0u;
+      for (; i < node.items; ++i) {
+        if (!trace_mesh(view, ray, tree.instances.instances[tree.items.indices[node.first + i]], found)) return false;
       }
+      if (i < node.items) return false;
     } else if (meets) {
-      float limit = limit_of(view, found);
+      float limit = limit_of(view, found, boxes);
       float a = enters(boxes, tree.nodes.nodes[node.first], limit);
       float b = enters(boxes, tree.nodes.nodes[node.first + 1u], limit);
       bool first_is_nearer = b < 0.0 || (a >= 0.0 && a <= b);
@@ -178,9 +190,10 @@ void trace_scene(View view, Ray ray, SceneTree tree, inout Found found) {
       at = first_is_nearer ? node.first : node.first + 1u;
       continue;
     }
-    if (open == 0u) return;
+    if (open == 0u) return true;
     at = stack[--open];
   }
+  return false;
 }
 
 void main() {
@@ -189,6 +202,6 @@ void main() {
   if (i >= uint64_t(view.size.x) * view.size.y) return;
   uvec2 pixel = uvec2(uint(i) % view.size.x, uint(i) / view.size.x);
   Found found = Found(0ul, double(0.0));
-  trace_scene(view, view_ray(view, pixel), scene.tree, found);
-  found_keys.keys[uint(i)] = found.key;
+  bool finished = trace_scene(view, view_ray(view, pixel), scene.tree, found);
+  found_keys.keys[uint(i)] = finished ? found.key : kUnfinished;
 }
