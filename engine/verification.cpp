@@ -234,6 +234,36 @@ void report(std::span<const VerifiedTile> tiles, std::span<const Difference> dif
   if (tiles.size() > kMaxLines) log::warning("frame {}: and {} more tiles", frame, tiles.size() - kMaxLines);
 }
 
+/// Collective. Brings the second drawings of `tiles` to their owners, sample by sample.
+std::vector<TileDrawing> send_to_owners(Communicator& comm, std::span<const VerifiedTile> tiles,
+                                        std::span<const TileDrawing> second, bool lit) {
+  std::vector<TileMove> moves;
+  moves.reserve(tiles.size());
+  for (const VerifiedTile& each : tiles) moves.push_back({each.tile, each.checker, each.owner});
+  std::vector<TileDrawing> received;
+  TileReader reader;
+  for (const TileDrawing& drawing : second) {
+    received.push_back({TileLayer<Key>(drawing.keys.layout()), TileLayer<Rgb>(drawing.keys.layout()),
+                        TileLayer<float>(drawing.alpha.layout())});
+    received.back().keys.set_depth_format(drawing.keys.depth_format());
+    move_tiles(comm, moves, drawing.keys, received.back().keys, reader);
+    if (lit) move_tiles(comm, moves, drawing.radiance, received.back().radiance, reader);
+    if (lit && drawing.alpha.tiles() > 0) move_tiles(comm, moves, drawing.alpha, received.back().alpha, reader);
+  }
+  return received;
+}
+
+/// Takes a tile of every sample over from the second drawings.
+void replace_tile(std::span<const TileDrawing> second, std::size_t tile, bool lit, std::span<Frame> frames) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    copy_tiles(second[i].keys, *frames[i].keys, {&tile, 1});
+    if (lit) copy_tiles(second[i].radiance, frames[i].radiance, {&tile, 1});
+    if (lit && frames[i].is_transparent) {
+      copy_tiles(second[i].alpha, frames[i].aovs.single.at(Aov::Coverage), {&tile, 1});
+    }
+  }
+}
+
 }  // namespace
 
 VerifyCounts verify_tiles(Communicator& comm, const std::string& host, const VerifiedSamples& samples,
@@ -251,35 +281,14 @@ VerifyCounts verify_tiles(Communicator& comm, const std::string& host, const Ver
   (void)redrawing.draw(tiles, &VerifiedTile::judge, &VerifiedTile::judge_hash);
 
   // The owners get the second drawing: to find where theirs differs, and to take it over where it won.
-  std::vector<TileMove> moves;
-  moves.reserve(tiles.size());
-  for (const VerifiedTile& each : tiles) moves.push_back({each.tile, each.checker, each.owner});
-  std::vector<TileDrawing> received;
-  TileReader reader;
-  for (const TileDrawing& drawing : second) {
-    received.push_back({TileLayer<Key>(drawing.keys.layout()), TileLayer<Rgb>(drawing.keys.layout()),
-                        TileLayer<float>(drawing.alpha.layout())});
-    received.back().keys.set_depth_format(drawing.keys.depth_format());
-    move_tiles(comm, moves, drawing.keys, received.back().keys, reader);
-    if (samples.lit) move_tiles(comm, moves, drawing.radiance, received.back().radiance, reader);
-    if (samples.lit && drawing.alpha.tiles() > 0) {
-      move_tiles(comm, moves, drawing.alpha, received.back().alpha, reader);
-    }
-  }
+  const std::vector<TileDrawing> received = send_to_owners(comm, tiles, second, samples.lit);
   std::vector<Difference> mine;
   for (const VerifiedTile& each : tiles) {
     counts.mismatches += 1;
     counts.unmended += each.is_unmended() ? 1U : 0U;
     if (each.owner != comm.rank()) continue;
     mine.push_back(find_difference(owned, samples_of(received, samples.lit), each.tile, samples));
-    if (!each.is_replaced()) continue;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      copy_tiles(received[i].keys, *frames[i].keys, {&each.tile, 1});
-      if (samples.lit) copy_tiles(received[i].radiance, frames[i].radiance, {&each.tile, 1});
-      if (samples.lit && frames[i].is_transparent) {
-        copy_tiles(received[i].alpha, frames[i].aovs.single.at(Aov::Coverage), {&each.tile, 1});
-      }
-    }
+    if (each.is_replaced()) replace_tile(received, each.tile, samples.lit, frames);
   }
   std::vector<Difference> differences;
   for (const auto& list : all_gather_lists(comm, std::span<const Difference>(mine))) {
