@@ -12,6 +12,7 @@
 #include "core/json.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "raster/gl_context.h"
 #include "tools/stability/stability.h"
 #include "tools/sweep.h"
 
@@ -44,6 +45,7 @@ class StabilityCommand final : public Command {
       for (const StabilityCase& one : cases) fmt::print("{:<20} {}\n", one.name, one.about);
       return ExitCode::Done;
     }
+    check_gl_backend(globals.backend);  // its cases draw by OpenGL themselves
     if (!html_.empty()) check_writable(html_, globals.force);
     const std::vector<StabilityFinding> findings = measure(cases, globals);
     write_if_named(html_, [&] { return stability_html(findings); });
