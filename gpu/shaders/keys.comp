@@ -78,11 +78,12 @@ struct Found {
   double along;  // metres from the eye along the view's axis
 };
 
-// What rounding may do to barycentric coordinates, so that no ray slips through between two triangles: more where the place is
-// far away for the triangle's size, or seen nearly edge-on.
+// How far off a triangle its barycentric coordinates may be: about as far as Embree's rounding has it, so that a ray through the
+// edge between two triangles meets both, of which the one with the lower id stays; and what rounding may do to them, more where
+// the place is far away for the triangle's size, or seen nearly edge-on, so that no ray slips through between two.
 double edge_of(dvec3 from_v0, dvec3 direction, dvec3 e1, dvec3 e2, double determinant) {
   double longest = max(length(e1), length(e2));
-  return min(1e-12 + 1.8e-15 * length(from_v0) * length(direction) * longest / abs(determinant), double(1e-6));
+  return min(5.9604645e-8 + 1.8e-15 * length(from_v0) * length(direction) * longest / abs(determinant), double(1e-6));
 }
 
 void meet(View view, Ray ray, Instance instance, uint triangle, inout Found found) {
