@@ -7,7 +7,6 @@
 #include <array>
 #include <atomic>
 #include <cstring>
-#include <functional>
 #include <optional>
 #include <utility>
 
@@ -150,12 +149,6 @@ GpuDevice::Instance::Instance(bool validate) {
 
 namespace {
 
-/// A feature hpr's kernels need: whether a device has it, and what it is called.
-struct Need {
-  VkBool32 there;
-  std::string_view name;
-};
-
 struct Features {
   VkPhysicalDeviceFeatures2 base =
       vulkan_structure<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
@@ -163,30 +156,25 @@ struct Features {
       vulkan_structure<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
 };
 
-/// 64-bit keys and their largest by atomics, places in double, buffers by address, and semaphores that count.
-Features needed_features() {
-  Features needed;
-  needed.base.features.shaderInt64 = VK_TRUE;
-  needed.base.features.shaderFloat64 = VK_TRUE;
-  needed.more.shaderBufferInt64Atomics = VK_TRUE;
-  needed.more.bufferDeviceAddress = VK_TRUE;
-  needed.more.timelineSemaphore = VK_TRUE;
-  needed.more.scalarBlockLayout = VK_TRUE;
-  return needed;
-}
+/// What hpr's kernels need: 64-bit keys, places in double, buffers by address, and semaphores that count.
+struct Need {
+  std::string_view name;
+  VkBool32& (*of)(Features&);
+};
+constexpr std::array<Need, 5> kNeeds{
+    {{"shaderInt64", [](Features& f) -> VkBool32& { return f.base.features.shaderInt64; }},
+     {"shaderFloat64", [](Features& f) -> VkBool32& { return f.base.features.shaderFloat64; }},
+     {"bufferDeviceAddress", [](Features& f) -> VkBool32& { return f.more.bufferDeviceAddress; }},
+     {"timelineSemaphore", [](Features& f) -> VkBool32& { return f.more.timelineSemaphore; }},
+     {"scalarBlockLayout", [](Features& f) -> VkBool32& { return f.more.scalarBlockLayout; }}}};
 
 std::string missing_of(const VulkanFunctions& vk, VkPhysicalDevice device) {
   Features found;
   found.base.pNext = &found.more;
   vk.GetPhysicalDeviceFeatures2(device, &found.base);
   std::string missing;
-  for (const Need& need :
-       {Need{found.base.features.shaderInt64, "shaderInt64"}, Need{found.base.features.shaderFloat64, "shaderFloat64"},
-        Need{found.more.shaderBufferInt64Atomics, "shaderBufferInt64Atomics"},
-        Need{found.more.bufferDeviceAddress, "bufferDeviceAddress"},
-        Need{found.more.timelineSemaphore, "timelineSemaphore"},
-        Need{found.more.scalarBlockLayout, "scalarBlockLayout"}}) {
-    if (need.there == VK_TRUE) continue;
+  for (const Need& need : kNeeds) {
+    if (need.of(found) == VK_TRUE) continue;
     missing += missing.empty() ? "" : ", ";
     missing += need.name;
   }
@@ -254,6 +242,14 @@ std::string list_of(const std::vector<GpuInfo>& gpus) {
   return list.empty() ? "none" : list;
 }
 
+/// In the order in which they are chosen.
+enum class Kind { Card, Shared, Software };
+
+Kind kind_of(const GpuInfo& gpu) {
+  if (gpu.software) return Kind::Software;
+  return gpu.discrete ? Kind::Card : Kind::Shared;
+}
+
 }  // namespace
 
 std::vector<GpuInfo> find_gpus() {
@@ -274,15 +270,12 @@ GpuInfo choose_gpu(const std::vector<GpuInfo>& gpus, const GpuOptions& options) 
     }
     return gpus[at];
   }
-  const std::array<std::function<bool(const GpuInfo&)>, 3> kinds{
-      [](const GpuInfo& gpu) { return gpu.discrete; },
-      [](const GpuInfo& gpu) { return !gpu.discrete && !gpu.software; },
-      [&](const GpuInfo& gpu) { return gpu.software && options.software; }};
-  for (const auto& is_of_kind : kinds) {
+  for (const Kind kind : {Kind::Card, Kind::Shared, Kind::Software}) {
+    if (kind == Kind::Software && !options.software) continue;
     std::vector<const GpuInfo*> usable;
     for (const GpuInfo& gpu : gpus) {
       const bool is_new = std::ranges::none_of(usable, [&](const GpuInfo* other) { return other->uuid == gpu.uuid; });
-      if (is_of_kind(gpu) && gpu.lacks.empty() && is_new) usable.push_back(&gpu);
+      if (kind_of(gpu) == kind && gpu.lacks.empty() && is_new) usable.push_back(&gpu);
     }
     if (!usable.empty()) return *usable[static_cast<std::size_t>(options.local_rank) % usable.size()];
   }
@@ -313,7 +306,8 @@ GpuDevice::GpuDevice(const GpuOptions& options)
   queue.queueFamilyIndex = queue_family_;
   queue.queueCount = 1;
   queue.pQueuePriorities = &priority;
-  Features needed = needed_features();
+  Features needed;
+  for (const Need& need : kNeeds) need.of(needed) = VK_TRUE;
   needed.base.pNext = &needed.more;
   auto wanted = vulkan_structure<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   wanted.pNext = &needed.base;

@@ -86,7 +86,6 @@ Image<Key> GpuKeys::draw(const GpuScene& scene, const View& view) {
     keys_.emplace(device_, bytes, GpuMemory::Device);
     read_.emplace(device_, bytes, GpuMemory::Readback);
   }
-  times_ = {{"keys", 0.0}, {"read keys", 0.0}};
   for (int y = 0; y < view.size().height; y += rows) {
     View band = view;
     band.block.y0 = view.block.y0 + y;
@@ -98,13 +97,10 @@ Image<Key> GpuKeys::draw(const GpuScene& scene, const View& view) {
 
 void GpuKeys::draw_band(const GpuScene& scene, const View& band, std::span<Key> pixels) {
   view_.mapped<GpuView>()[0] = as_read(band);
-  batch_.begin_pass("keys");
   batch_.run(kernel_, pixels.size(), Constants{keys_->address(), view_.address(), scene.address()});
-  batch_.begin_pass("read keys");
   batch_.copy(*keys_, *read_, pixels.size_bytes());
   batch_.submit();
   batch_.wait();
-  for (std::size_t i = 0; i < batch_.times().size(); ++i) times_[i].ms += batch_.times()[i].ms;
   const std::span<const Key> found = read_->mapped<const Key>().first(pixels.size());
   if (std::ranges::find(found, kUnfinished) != found.end()) {
     throw Error(ExitCode::Limit,

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "gpu/gpu_batch.h"
 #include "gpu/gpu_buffer.h"
@@ -29,8 +28,6 @@ class GpuKeys {
   /// The keys of a view, which has no points (View::points), as large as it. Throws Error: Limit where a software
   /// device gives up a ray that meets too much.
   [[nodiscard]] Image<Key> draw(const GpuScene& scene, const View& view);
-  /// What the last draw() took on the device; 0 where that has no clock.
-  [[nodiscard]] const std::vector<GpuPassTime>& times() const { return times_; }
 
  private:
   /// Some rows of it.
@@ -42,7 +39,6 @@ class GpuKeys {
   std::optional<GpuBuffer> keys_;
   std::optional<GpuBuffer> read_;
   GpuBatch batch_;
-  std::vector<GpuPassTime> times_;
 };
 
 }  // namespace hpr

@@ -57,6 +57,18 @@ Differences between(const Image<Key>& a, const Image<Key>& b) {
   return found;
 }
 
+/// A view of parallel rays, so many metres high from its middle, from half a metre before it up to `far`.
+View orthographic(View view, double half_height, double far) {
+  view.orthographic = true;
+  view.near_distance = 0.5;
+  view.far_distance = far;
+  view.top = half_height;
+  view.bottom = -half_height;
+  view.right = half_height * view.screen.width / view.screen.height;
+  view.left = -view.right;
+  return view;
+}
+
 class GpuKeysTest : public test::OnGpu {
  protected:
   void expect_as_embree(const Scene& scene, const View& view, const std::string& what, double others = 5e-4) {
@@ -120,14 +132,7 @@ TEST_F(GpuKeysTest, SidesAndShapesOfInstancesAreThoseOfEmbree) {
   expect_as_embree(scene, test::view_from({0.5, 0.3, -8}, {0, 0, 0}, {160, 120}, scene), "behind");
   expect_as_embree(scene, test::view_from({700, 900, 8000}, {0, 0, 0}, {160, 120}, scene, 0.001), "far");
   expect_as_embree(scene, test::view_from({0, 0.2, 0.3}, {0, 0, -1}, {160, 120}, scene, 2.0), "within");
-  View from_above = test::view_from({1, 6, 2}, {0, 0, 0}, {160, 120}, scene);
-  from_above.orthographic = true;
-  from_above.near_distance = 0.5;
-  from_above.far_distance = 40.0;
-  from_above.left = -4.0;
-  from_above.right = 4.0;
-  from_above.bottom = -3.0;
-  from_above.top = 3.0;
+  const View from_above = orthographic(test::view_from({1, 6, 2}, {0, 0, 0}, {160, 120}, scene), 3.0, 40.0);
   expect_as_embree(scene, from_above, "orthographic");
 }
 
@@ -153,14 +158,7 @@ TEST_F(GpuKeysTest, SurfacesOfOneDepthAreThoseOfEmbree) {
     place_mesh(scene, wall, glm::translate(glm::dmat4(1.0), glm::dvec3(0.1 * i, 0.0, 0.02 * i)));
   }
   finish_scene(scene);
-  View view = test::view_from({0, 0, 3}, {0, 0, 0}, {160, 120}, scene);
-  view.orthographic = true;
-  view.near_distance = 0.5;
-  view.far_distance = 4e6;
-  view.left = -2.0;
-  view.right = 2.0;
-  view.bottom = -1.5;
-  view.top = 1.5;
+  const View view = orthographic(test::view_from({0, 0, 3}, {0, 0, 0}, {160, 120}, scene), 1.5, 4e6);
   expect_as_embree(scene, view, "orthographic");
 }
 

@@ -250,10 +250,4 @@ std::optional<glm::dmat3> usable_inverse(const glm::dmat3& linear) {
   return inverse;
 }
 
-std::size_t GpuScene::bytes() const {
-  std::size_t bytes = 0;
-  for (const GpuBuffer& buffer : buffers_) bytes += buffer.bytes();
-  return bytes;
-}
-
 }  // namespace hpr

@@ -22,8 +22,6 @@ class GpuScene {
 
   /// As SceneTrees of scene.glsl.
   [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
-  /// On the device.
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   std::vector<GpuBuffer> buffers_;  ///< what others refer to comes before them; the last one is the scene's tree

@@ -9,11 +9,10 @@ Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
 import json
 import pathlib
 import struct
-import subprocess
 import sys
 import tempfile
 
-from program import HPR, expect, failures
+from program import expect, failures, run
 
 SIZE = (96, 72)
 OTHERS = 0.0005  # of the pixels may show another surface
@@ -22,7 +21,7 @@ SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "
 
 
 def hpr(folder, *arguments, code=0):
-    result = subprocess.run([HPR, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    result = run(folder, *arguments)
     expect(result.returncode == code, f"{' '.join(arguments)}: left with {result.returncode}: {result.stderr[-800:]}")
     return result
 
@@ -38,7 +37,7 @@ def surfaces(keys):
 
 
 def has_device(folder):
-    findings = json.loads(subprocess.run([HPR, "doctor", "--json"], cwd=folder, capture_output=True, text=True, timeout=120, check=False).stdout)["findings"]
+    findings = json.loads(run(folder, "doctor", "--json").stdout)["findings"]
     return next(finding for finding in findings if finding["name"] == "Vulkan")["status"] == "ok"
 
 
