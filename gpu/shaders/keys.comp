@@ -5,28 +5,8 @@
 #include "threads.glsl"
 
 #include "scene.glsl"
+#include "view.glsl"
 
-struct View {
-  dvec3 eye;
-  dvec3 right;
-  dvec3 up;
-  dvec3 back;
-  double left_edge;
-  double right_edge;
-  double bottom_edge;
-  double top_edge;
-  double near_distance;
-  double far_distance;  // orthographic only
-  dvec2 jitter;
-  ivec2 block;   // its upper left corner on the screen
-  uvec2 size;    // of the block
-  uvec2 screen;  // pixels of the whole screen
-  uint orthographic;
-  uint padding;
-};
-layout(buffer_reference, scalar) readonly buffer Views {
-  View view;
-};
 layout(buffer_reference, scalar) writeonly buffer Keys {
   uint64_t keys[];
 };
@@ -37,27 +17,6 @@ layout(push_constant, scalar) uniform Constants {
 };
 
 const uint64_t kUnfinished = ~0ul;  // of no surface: its depth is no number
-
-struct Ray {
-  dvec3 origin;
-  dvec3 direction;  // one metre along the view's axis
-};
-
-Ray view_ray(View view, uvec2 pixel) {
-  precise dvec2 at = (dvec2(view.block) + (dvec2(pixel) + 0.5) + view.jitter) / dvec2(view.screen);
-  precise double x = view.left_edge + (view.right_edge - view.left_edge) * at.x;
-  precise double y = view.top_edge - (view.top_edge - view.bottom_edge) * at.y;
-  precise dvec3 direction;
-  precise dvec3 origin;
-  if (view.orthographic != 0u) {
-    origin = view.eye + (view.right * x + view.up * y + view.back * double(0.0));
-    direction = -view.back;
-  } else {
-    origin = view.eye;
-    direction = view.right * x + view.up * y + view.back * double(-1.0);
-  }
-  return Ray(origin, direction);
-}
 
 precise dvec3 exact_cross(dvec3 a, dvec3 b) {
   precise dvec3 c = dvec3(a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y);
