@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -13,7 +12,7 @@
 #include <utility>
 
 #include "gpu/bvh.h"
-#include "gpu/gpu_batch.h"
+#include "gpu/gpu_uploads.h"
 
 namespace hpr {
 namespace {
@@ -82,7 +81,7 @@ FloatBox rounded(const Bounds& box) {
 class Builder {
  public:
   Builder(const GpuDevice& device, const Scene& scene, int threads, std::vector<GpuBuffer>& buffers)
-      : device_(device), scene_(scene), bvhs_(threads), buffers_(buffers), batch_(device) {
+      : scene_(scene), bvhs_(threads), uploads_(device, buffers) {
     tree_.center = 0.5 * scene.bounds.low + 0.5 * scene.bounds.high;
   }
 
@@ -120,10 +119,10 @@ class Builder {
     const Bvh bvh = bvhs_.build(boxes_);
     if (!bvh.nodes.empty()) {
       const PlacedTree placed = place(bvh);
-      const std::uint64_t nodes = upload(std::span<const BvhNode>(nodes_));
-      const std::uint64_t items = upload(std::span<const std::uint32_t>(items_));
-      const std::uint64_t positions = upload(std::span<const glm::vec3>(positions_));
-      const std::uint64_t triangles = upload(std::span<const glm::uvec3>(triangles_));
+      const std::uint64_t nodes = uploads_.put(nodes_);
+      const std::uint64_t items = uploads_.put(items_);
+      const std::uint64_t positions = uploads_.put(positions_);
+      const std::uint64_t triangles = uploads_.put(triangles_);
       for (GpuInstance& instance : instances_) {  // from indices to addresses
         instance.nodes = nodes + instance.nodes * sizeof(BvhNode);
         instance.items = items + instance.items * sizeof(std::uint32_t);
@@ -132,28 +131,14 @@ class Builder {
       }
       tree_.nodes = nodes + placed.nodes * sizeof(BvhNode);
       tree_.items = items + placed.items * sizeof(std::uint32_t);
-      tree_.instances = upload(std::span<const GpuInstance>(instances_));
+      tree_.instances = uploads_.put(instances_);
       tree_.largest = largest_of(placed.root);
       tree_.is_empty = 0;
     }
-    upload(std::span<const GpuSceneTree>(&tree_, 1));
+    (void)uploads_.put_one(tree_);
   }
 
  private:
-  /// Returns the address.
-  template <typename T>
-  std::uint64_t upload(std::span<const T> values) {
-    const auto bytes = std::as_bytes(values);
-    staging_.emplace(device_, bytes.size(), GpuMemory::Upload);
-    std::memcpy(staging_->mapped().data(), bytes.data(), bytes.size());
-    const GpuBuffer& there = buffers_.emplace_back(device_, bytes.size(), GpuMemory::Device);
-    batch_.copy(*staging_, there, bytes.size());
-    batch_.submit();
-    batch_.wait();
-    staging_.reset();
-    return there.address();
-  }
-
   PlacedTree place(const Bvh& bvh) {
     const PlacedTree placed{nodes_.size(), items_.size(), bvh.nodes.front()};
     nodes_.insert(nodes_.end(), bvh.nodes.begin(), bvh.nodes.end());
@@ -208,12 +193,9 @@ class Builder {
     return meshes_.emplace(mesh, placed).first->second;
   }
 
-  const GpuDevice& device_;
   const Scene& scene_;
   BvhBuilder bvhs_;
-  std::vector<GpuBuffer>& buffers_;
-  std::optional<GpuBuffer> staging_;  ///< before the batch, which may still read it when it ends
-  GpuBatch batch_;
+  GpuUploads uploads_;
   GpuSceneTree tree_;
   std::vector<GpuInstance> instances_;
   std::vector<FloatBox> boxes_;  ///< of instances, relative to the tree's centre

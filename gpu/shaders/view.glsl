@@ -16,7 +16,7 @@ struct View {
   uvec2 size;    // of the block
   uvec2 screen;  // pixels of the whole screen
   uint orthographic;
-  uint padding;
+  uint screen_number;
 };
 layout(buffer_reference, scalar) readonly buffer Views {
   View view;

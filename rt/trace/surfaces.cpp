@@ -261,23 +261,18 @@ std::uint8_t Surfaces::layer_of(const WorldTriangle& triangle, bool inside) cons
   return static_cast<std::uint8_t>(2 * (1 + number % 127) + (inside ? 1 : 0));
 }
 
-namespace {
-
 bool needs_tangents(const Material& material) {
   if (material.normal_texture.present()) return true;
   if (!material.extensions) return false;
   return material.extensions->clearcoat_normal_texture.present() || material.extensions->anisotropy > 0.0F;
 }
 
-/// The texture by whose coordinates tangents go.
 const TextureRef& map_of_tangents(const Material& material) {
   if (material.normal_texture.present() || !material.extensions) return material.normal_texture;
   const MaterialExtensions& extensions = *material.extensions;
   return extensions.clearcoat_normal_texture.present() ? extensions.clearcoat_normal_texture
                                                        : extensions.anisotropy_texture;
 }
-
-}  // namespace
 
 Surfaces::PlanePoint Surfaces::plane_point(const WorldTriangle& triangle, const glm::dvec3& origin,
                                            const glm::dvec3& direction) const {

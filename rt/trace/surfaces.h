@@ -112,6 +112,23 @@ class Surfaces {
   /// the rounding of the mesh's own coordinates comes to along the normal, and what SurfacePoint::offset is for.
   [[nodiscard]] double coplanar_tolerance(const WorldTriangle& triangle, double offset) const;
 
+  /// What is kept of an instance.
+  struct Placed {
+    glm::dmat3 normal_matrix{
+        1.0};  ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
+    bool swaps_handedness = false;  ///< turns windings round
+    bool is_refined = false;        ///< see refined_instances
+    bool is_instanced = false;      ///< in the ray scene, whose rays are carried into its coordinates and back
+    glm::dmat3 spread{0.0};         ///< |A| |A^-1| of the instanced mesh: how far the rounding of a coordinate reaches
+    glm::dvec3 reach{0.0};          ///< metres: |A| |vertex| + spread |translation|
+  };
+  /// Per instance of the scene.
+  [[nodiscard]] std::span<const Placed> placed() const { return placed_; }
+  /// Which part each triangle of a mesh belongs to (parts_of); empty but for meshes that cover in part.
+  [[nodiscard]] std::span<const std::uint32_t> parts(std::uint32_t mesh) const { return parts_[mesh]; }
+  [[nodiscard]] const RaySpace& space() const { return space_; }
+  [[nodiscard]] bool lifts() const { return lifts_; }
+
  private:
   /// Barycentric coordinates of a triangle's corners.
   using Weights = std::array<double, 3>;
@@ -138,16 +155,6 @@ class Surfaces {
   [[nodiscard]] double offset_of(const WorldTriangle& triangle) const;
   static void lift(const WorldTriangle& triangle, const Weights& weights, double side, SurfacePoint& point);
   void add_tangents(const WorldTriangle& triangle, const Weights& weights, SurfacePoint& point) const;
-
-  struct Placed {
-    glm::dmat3 normal_matrix{
-        1.0};  ///< cofactors: the inverse transpose up to its sign and size, defined even if singular
-    bool swaps_handedness = false;  ///< turns windings round
-    bool is_refined = false;        ///< see refined_instances
-    bool is_instanced = false;      ///< in the ray scene, whose rays are carried into its coordinates and back
-    glm::dmat3 spread{0.0};         ///< |A| |A^-1| of the instanced mesh: how far the rounding of a coordinate reaches
-    glm::dvec3 reach{0.0};          ///< metres: |A| |vertex| + spread |translation|
-  };
 
   const Scene& scene_;
   RaySpace space_;
@@ -178,6 +185,11 @@ class RecentTriangles {
 /// Which part of its mesh each triangle belongs to: triangles are of one part that share a place, by whatever vertices.
 /// Numbers from 0, in the order of each part's first triangle. O(n log n).
 [[nodiscard]] std::vector<std::uint32_t> parts_of(const Mesh& mesh);
+
+/// Whether points of such surfaces have tangents.
+[[nodiscard]] bool needs_tangents(const Material& material);
+/// The texture by whose coordinates tangents go where the mesh has none; maybe not present.
+[[nodiscard]] const TextureRef& map_of_tangents(const Material& material);
 
 /// Barycentric coordinates moved onto the triangle; its middle where they are undefined (a triangle seen edge-on).
 [[nodiscard]] inline glm::dvec2 onto_triangle(double u, double v) {
