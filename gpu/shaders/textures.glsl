@@ -81,25 +81,23 @@ dvec4 sample_texture(Textures textures, uint number, uint encoding, dvec2 uv) {
   precise double s = wrapped(uv.x, texture.wrap_s) * double(size.x);
   precise double t = wrapped(uv.y, texture.wrap_t) * double(size.y);
   uint width = uint(size.x);
-  if (texture.nearest != 0u) {
-    int column = texel_index(int(s), size.x, texture.wrap_s);
-    int row = texel_index(int(t), size.y, texture.wrap_t);
-    return decoded(textures, texture.image.texels[uint(row) * width + uint(column)], encoding);
-  }
-  precise double x = s - 0.5lf;
-  precise double y = t - 0.5lf;
+  double off = texture.nearest != 0u ? 0.0lf : 0.5lf;
+  precise double x = s - off;
+  precise double y = t - off;
   int x0 = x < 0.0lf ? -1 : int(x);
   int y0 = y < 0.0lf ? -1 : int(y);
   precise double fx = x - double(x0);
   precise double fy = y - double(y0);
+  int next = texture.nearest != 0u ? 0 : 1;
   uint left = uint(texel_index(x0, size.x, texture.wrap_s));
-  uint right = uint(texel_index(x0 + 1, size.x, texture.wrap_s));
+  uint right = uint(texel_index(x0 + next, size.x, texture.wrap_s));
   uint above = uint(texel_index(y0, size.y, texture.wrap_t)) * width;
-  uint below = uint(texel_index(y0 + 1, size.y, texture.wrap_t)) * width;
+  uint below = uint(texel_index(y0 + next, size.y, texture.wrap_t)) * width;
   uvec4 texels = uvec4(texture.image.texels[above + left], texture.image.texels[above + right],
                        texture.image.texels[below + left], texture.image.texels[below + right]);
-  if (texels.x == texels.y && texels.x == texels.z && texels.x == texels.w) return decoded(textures, texels.x, encoding);
-  precise dvec4 upper = decoded(textures, texels.x, encoding) * (1.0lf - fx) + decoded(textures, texels.y, encoding) * fx;
+  dvec4 first = decoded(textures, texels.x, encoding);
+  if (texels.x == texels.y && texels.x == texels.z && texels.x == texels.w) return first;
+  precise dvec4 upper = first * (1.0lf - fx) + decoded(textures, texels.y, encoding) * fx;
   precise dvec4 lower = decoded(textures, texels.z, encoding) * (1.0lf - fx) + decoded(textures, texels.w, encoding) * fx;
   precise dvec4 mixed = upper * (1.0lf - fy) + lower * fy;
   return mixed;
