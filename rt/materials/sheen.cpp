@@ -41,9 +41,9 @@ double Sheen::visibility(double normal_light) const {
 
 namespace {
 
-constexpr std::size_t kSteps = 32;
-/// [root of the roughness][root of the cosine], both from 0 to 1: dense where the albedo changes most.
-using AlbedoTable = std::array<std::array<double, kSteps>, kSteps>;
+constexpr std::size_t kSteps = kSheenSteps;
+/// Rows of the root of the roughness by that of the cosine: dense where the albedo changes most.
+using AlbedoTable = std::array<double, kSteps * kSteps>;
 
 /// By the midpoint rule over the light's cosine, dense where it grazes, and half of the circle.
 double integrate(double roughness, double normal_view) {
@@ -75,7 +75,7 @@ AlbedoTable make_table() {
       const double root = static_cast<double>(column) / (kSteps - 1);
       const double cosine = std::max(squared(root), kMinCosine);
       // Smooth where grazing light would be more than arrives, so that what lies between is right.
-      table[row][column] = integrate(squared(static_cast<double>(row) / (kSteps - 1)), cosine);
+      table[row * kSteps + column] = integrate(squared(static_cast<double>(row) / (kSteps - 1)), cosine);
     }
   }
   return table;
@@ -83,8 +83,13 @@ AlbedoTable make_table() {
 
 }  // namespace
 
-double sheen_albedo(double roughness, double normal_view) {
+std::span<const double> sheen_albedo_table() {
   static const AlbedoTable table = make_table();
+  return table;
+}
+
+double sheen_albedo(double roughness, double normal_view) {
+  const std::span<const double> table = sheen_albedo_table();
   const auto index_of = [](double value) { return std::clamp(value, 0.0, 1.0) * (kSteps - 1); };
   const double y = index_of(std::sqrt(std::max(roughness, 0.0)));
   const double x = index_of(std::sqrt(std::max(normal_view, 0.0)));
@@ -92,7 +97,9 @@ double sheen_albedo(double roughness, double normal_view) {
   const auto column = std::min(static_cast<std::size_t>(x), kSteps - 2);
   const double fy = y - static_cast<double>(row);
   const double fx = x - static_cast<double>(column);
-  const auto along = [&](std::size_t r) { return table[r][column] * (1.0 - fx) + table[r][column + 1] * fx; };
+  const auto along = [&](std::size_t r) {
+    return table[r * kSteps + column] * (1.0 - fx) + table[r * kSteps + column + 1] * fx;
+  };
   return std::clamp(along(row) * (1.0 - fy) + along(row + 1) * fy, 0.0, 1.0);
 }
 

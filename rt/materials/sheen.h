@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 namespace hpr {
 
 /// White sheen looked at from one side: Conty Estevez and Kulla, "Production Friendly Microfacet Sheen BRDF", 2017, as
@@ -35,5 +38,9 @@ class Sheen {
 /// The share of a furnace's light that white sheen reflects to a viewer whose direction has this cosine, 0 to 1. From a
 /// table, which the first call computes: within 0.002, and 0.01 below a roughness or cosine of 0.1.
 [[nodiscard]] double sheen_albedo(double roughness, double normal_view);
+
+/// What sheen_albedo() interpolates: [root of the roughness][root of the cosine], kSheenSteps of each from 0 to 1.
+[[nodiscard]] std::span<const double> sheen_albedo_table();
+inline constexpr std::size_t kSheenSteps = 32;
 
 }  // namespace hpr
