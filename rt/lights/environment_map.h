@@ -42,6 +42,16 @@ class EnvironmentMap {
   /// Whether radiance is the same in all directions.
   [[nodiscard]] bool is_constant() const { return environment_->is_constant(); }
 
+  // What it samples by, as devices have it. Tables of a constant one are empty.
+  [[nodiscard]] const Environment& environment() const { return *environment_; }
+  [[nodiscard]] Size cells() const { return cells_; }
+  [[nodiscard]] const FacingTables& facing() const { return facing_; }
+  [[nodiscard]] std::span<const double> row_cosines() const { return row_cosines_; }
+  [[nodiscard]] std::span<const double> row_sums() const { return row_sums_; }
+  [[nodiscard]] std::span<const double> texel_sums() const { return texel_sums_; }
+  [[nodiscard]] std::span<const double> cell_powers() const { return cell_powers_; }
+  [[nodiscard]] double cosine_fraction() const { return cosine_fraction_; }
+
  private:
   /// A position of the picture, in texels.
   struct Position {

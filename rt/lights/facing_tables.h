@@ -39,6 +39,9 @@ class FacingTables {
   };
   [[nodiscard]] Table table(const glm::dvec3& normal) const;
 
+  /// Table after table, rows before cells: those of the 384 directions, then that of all directions alike.
+  [[nodiscard]] std::span<const double> sums() const { return sums_; }
+
  private:
   std::size_t rows_ = 0;
   std::size_t columns_ = 0;

@@ -4,6 +4,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "rt/lights/environment_map.h"
@@ -82,8 +83,8 @@ class LightSampler {
 
   static constexpr std::size_t kMaxEnumerated = 64;
 
- private:
-  /// Lights that can be chosen from: those that stand somewhere in a tree, the others beside it.
+  /// Lights that can be chosen from: those that stand somewhere in a tree, the others beside it. They are numbered:
+  /// punctual ones, triangles, the environment.
   struct Choices {
     LightTree tree;
     std::vector<std::uint32_t> in_tree;  ///< light of each of the tree's
@@ -91,13 +92,26 @@ class LightSampler {
     std::vector<std::uint32_t> outside;  ///< directional lights, the headlight, the environment
     std::vector<double> outside_sums;    ///< of their irradiance
   };
+  /// What sample() chooses from.
+  [[nodiscard]] const Choices& choices() const { return one(); }
+  /// Enumerated or not; in a scene that gives no light, the headlight.
+  [[nodiscard]] std::span<const Light> punctual() const { return punctual_; }
+  [[nodiscard]] const TriangleLights& triangles() const { return triangles_; }
+  [[nodiscard]] const std::optional<EnvironmentMap>& environment_map() const { return environment_; }
+  /// What emit() chooses from: running sums over all lights.
+  [[nodiscard]] std::span<const double> power_sums() const { return power_sums_; }
+  /// What photons of every light but the environment start in; empty where no solid absorbs.
+  [[nodiscard]] std::span<const Media> media() const { return media_; }
+  /// What photons from outside cross.
+  [[nodiscard]] const LitSphere& lit_sphere() const { return lit_; }
+
+ private:
   struct Chosen {
     std::size_t light = 0;
     double probability = 0.0;
     double rest = 0.0;  ///< of the random number, for lights outside the tree
   };
 
-  // Lights are numbered: punctual ones, triangles, the environment.
   [[nodiscard]] std::size_t environment_number() const { return punctual_.size() + triangles_.size(); }
   [[nodiscard]] const Choices& one() const { return enumerated_ > 0 ? sampled_ : all_; }
   [[nodiscard]] Choices make_choices(bool punctual) const;

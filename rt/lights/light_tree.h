@@ -72,13 +72,18 @@ class LightTree {
   /// With which choose() returns `light`: the same bits. O(log n).
   [[nodiscard]] double probability(const glm::dvec3& position, const glm::dvec3& normal, std::size_t light) const;
 
- private:
   struct Node {
     LightCluster lights;
     std::uint32_t second = 0;  ///< the other child; the first one follows its parent. 0: a leaf
     std::uint32_t parent = 0;
     std::uint32_t light = 0;  ///< of a leaf
   };
+  /// In depth-first order, as devices have them.
+  [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
+  /// The node of each light.
+  [[nodiscard]] std::span<const std::uint32_t> leaves() const { return leaf_of_; }
+
+ private:
   struct Builder;
 
   [[nodiscard]] double share_of_first(std::uint32_t node, const glm::dvec3& position, const glm::dvec3& normal) const;

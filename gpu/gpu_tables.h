@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "gpu/gpu_buffer.h"
+#include "gpu/gpu_device.h"
+
+namespace hpr {
+
+/// Arrays in a device's memory that the CPU made and shaders read. The device must outlive it.
+class GpuTables {
+ public:
+  explicit GpuTables(const GpuDevice& device) : device_(device) {}
+
+  /// Returns the address; 0 for an empty array. Throws Error (Limit) where the device has not so much memory left.
+  template <typename T>
+  std::uint64_t upload(std::span<const T> values) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return upload_bytes(std::as_bytes(values));
+  }
+
+ private:
+  std::uint64_t upload_bytes(std::span<const std::byte> bytes);
+
+  const GpuDevice& device_;
+  std::vector<GpuBuffer> buffers_;
+};
+
+}  // namespace hpr
