@@ -41,9 +41,10 @@ precise vec3 exact_unit(vec3 v) {
 }
 
 precise float fresnel_in_single(float cosine, float eta) {
-  precise float sine2 = (1.0 - cosine * cosine) * (1.0 / (eta * eta));
+  // Exact, as the differences below may be small.
+  precise float sine2 = (1.0 - cosine * cosine) * exact_quotient(1.0, eta * eta);
   if (!(sine2 < 1.0)) return 1.0;
-  precise float refracted = sqrt(1.0 - sine2);
+  precise float refracted = exact_root(1.0 - sine2);
   precise float parallel = (eta * cosine - refracted) / (eta * cosine + refracted);
   precise float perpendicular = (cosine - eta * refracted) / (cosine + eta * refracted);
   precise float both = 0.5 * (parallel * parallel + perpendicular * perpendicular);
