@@ -147,6 +147,18 @@ void PhotonMap::sort(std::span<const Photon> photons) {
   std::fill_n(positions_.get() + size_ + again, kReadBeyond, PhotonPlace{});
 }
 
+PhotonCells PhotonMap::cells() const {
+  if (size_ == 0) return {};
+  const std::size_t stored = starts_[slots_ + std::size_t{2}];
+  return {{starts_.get(), slots_ + std::size_t{3}},
+          {positions_.get(), stored},
+          {lights_.get(), stored},
+          cells_per_unit_,
+          slots_ - 1,
+          row_step_,
+          layer_step_};
+}
+
 double PhotonMap::density(double radius) const {
   return radius > 0.0 ? 2.0 / (std::numbers::pi * radius * radius) * flux_unit_ : 0.0;
 }

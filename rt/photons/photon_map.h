@@ -70,6 +70,17 @@ struct FoundPhotons {
 /// So many places behind the last one may be read.
 inline constexpr std::size_t kReadBeyond = 16;
 
+/// The cells of a map and what lies in them, as find_photons reads them: for devices that search it by themselves.
+struct PhotonCells {
+  std::span<const std::uint32_t> starts;
+  std::span<const PhotonPlace> positions;  ///< those of the first two slots are there twice
+  std::span<const PhotonLight> lights;
+  double per_unit = 0.0;  ///< in ray space
+  std::uint32_t last_slot = 0;
+  std::uint32_t row_step = 0;
+  std::uint32_t layer_step = 0;
+};
+
 /// Photons in a hash grid whose cells are as wide as the gather radius: with one radius for a whole map, as progressive
 /// photon mapping has it (Knaus and Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", 2011), a gather
 /// looks at 3 x 3 rows of cells.
@@ -107,6 +118,12 @@ class PhotonMap {
 
   /// By FoundPhotons::index.
   [[nodiscard]] const PhotonLight* lights() const { return lights_.get(); }
+
+  /// Empty where the map is. The map must outlive it, unchanged.
+  [[nodiscard]] PhotonCells cells() const;
+  [[nodiscard]] const RaySpace& space() const { return space_; }
+  /// W
+  [[nodiscard]] double flux_unit() const { return flux_unit_; }
 
   /// The photons' density there on layer 0, each weighted by its flux and `value(direction)`, a glm::dvec3 for the unit
   /// direction it came from: irradiance in W/m^2 for a value of 1, reflected radiance for that of a BRDF (flux density
