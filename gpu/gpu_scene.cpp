@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "gpu/bvh.h"
-#include "gpu/gpu_uploads.h"
+#include "gpu/gpu_tables.h"
 
 namespace hpr {
 namespace {
@@ -80,8 +80,7 @@ FloatBox rounded(const Bounds& box) {
 /// Puts a scene on a device: all of a kind in one buffer, as devices have few.
 class Builder {
  public:
-  Builder(const GpuDevice& device, const Scene& scene, int threads, std::vector<GpuBuffer>& buffers)
-      : scene_(scene), bvhs_(threads), uploads_(device, buffers) {
+  Builder(const Scene& scene, int threads, GpuTables& tables) : scene_(scene), bvhs_(threads), tables_(tables) {
     tree_.center = 0.5 * scene.bounds.low + 0.5 * scene.bounds.high;
   }
 
@@ -115,14 +114,15 @@ class Builder {
     boxes_.push_back(rounded({in_world.low - moved, in_world.high - moved}));
   }
 
-  void finish() {
+  /// Returns the address of the scene's tree.
+  [[nodiscard]] std::uint64_t finish() {
     const Bvh bvh = bvhs_.build(boxes_);
     if (!bvh.nodes.empty()) {
       const PlacedTree placed = place(bvh);
-      const std::uint64_t nodes = uploads_.put(nodes_);
-      const std::uint64_t items = uploads_.put(items_);
-      const std::uint64_t positions = uploads_.put(positions_);
-      const std::uint64_t triangles = uploads_.put(triangles_);
+      const std::uint64_t nodes = tables_.upload(nodes_);
+      const std::uint64_t items = tables_.upload(items_);
+      const std::uint64_t positions = tables_.upload(positions_);
+      const std::uint64_t triangles = tables_.upload(triangles_);
       for (GpuInstance& instance : instances_) {  // from indices to addresses
         instance.nodes = nodes + instance.nodes * sizeof(BvhNode);
         instance.items = items + instance.items * sizeof(std::uint32_t);
@@ -131,11 +131,11 @@ class Builder {
       }
       tree_.nodes = nodes + placed.nodes * sizeof(BvhNode);
       tree_.items = items + placed.items * sizeof(std::uint32_t);
-      tree_.instances = uploads_.put(instances_);
+      tree_.instances = tables_.upload(instances_);
       tree_.largest = largest_of(placed.root);
       tree_.is_empty = 0;
     }
-    (void)uploads_.put_one(tree_);
+    return tables_.upload_one(tree_);
   }
 
  private:
@@ -195,7 +195,7 @@ class Builder {
 
   const Scene& scene_;
   BvhBuilder bvhs_;
-  GpuUploads uploads_;
+  GpuTables& tables_;
   GpuSceneTree tree_;
   std::vector<GpuInstance> instances_;
   std::vector<FloatBox> boxes_;  ///< of instances, relative to the tree's centre
@@ -209,14 +209,15 @@ class Builder {
 
 }  // namespace
 
-GpuScene::GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects, int threads) {
-  Builder builder(device, scene, threads, buffers_);
+GpuScene::GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects, int threads)
+    : tables_(device) {
+  Builder builder(scene, threads, tables_);
   const auto ranges = merged_ranges({objects.begin(), objects.end()}, scene.triangles);
   for (const InstanceRange& part : split_by_instance(scene, ranges)) {
     HPR_CHECK(!scene.mesh_of(scene.instances[part.instance]).partial);
     builder.add(part);
   }
-  builder.finish();
+  address_ = builder.finish();
 }
 
 std::optional<glm::dmat3> usable_inverse(const glm::dmat3& linear) {

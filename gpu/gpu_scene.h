@@ -4,10 +4,9 @@
 #include <glm/mat3x3.hpp>
 #include <optional>
 #include <span>
-#include <vector>
 
-#include "gpu/gpu_buffer.h"
 #include "gpu/gpu_device.h"
+#include "gpu/gpu_tables.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -21,10 +20,11 @@ class GpuScene {
   GpuScene(const GpuDevice& device, const Scene& scene, std::span<const SurfaceRange> objects, int threads);
 
   /// As SceneTrees of scene.glsl.
-  [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
+  [[nodiscard]] std::uint64_t address() const { return address_; }
 
  private:
-  std::vector<GpuBuffer> buffers_;  ///< what others refer to comes before them; the last one is the scene's tree
+  GpuTables tables_;
+  std::uint64_t address_ = 0;
 };
 
 /// What undoes `linear`; none where that flattens what it places, or nearly so: boxes in a mesh's own coordinates would

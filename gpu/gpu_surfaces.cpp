@@ -9,7 +9,7 @@
 #include <span>
 
 #include "core/error.h"
-#include "gpu/gpu_uploads.h"
+#include "gpu/gpu_tables.h"
 #include "scene/bounds.h"
 
 namespace hpr {
@@ -63,7 +63,7 @@ class JoinedArrays {
     all_.insert(all_.end(), values.begin(), values.end());
     return first;
   }
-  void put(GpuUploads& uploads) { base_ = uploads.put(all_); }
+  void put(GpuTables& tables) { base_ = tables.upload(all_); }
   void to_address(std::uint64_t& first) const {
     if (first != 0) first = base_ + (first - 1) * sizeof(T);
   }
@@ -86,12 +86,12 @@ class MeshUploads {
             vectors_.add(mesh.tangents),
             parts_.add(parts)};
   }
-  void put(GpuUploads& uploads) {
-    positions_.put(uploads);
-    triangles_.put(uploads);
-    uvs_.put(uploads);
-    vectors_.put(uploads);
-    parts_.put(uploads);
+  void put(GpuTables& tables) {
+    positions_.put(tables);
+    triangles_.put(tables);
+    uvs_.put(tables);
+    vectors_.put(tables);
+    parts_.put(tables);
   }
   [[nodiscard]] MeshArrays addresses(MeshArrays arrays) const {
     positions_.to_address(arrays.positions);
@@ -137,22 +137,22 @@ GpuPlacement placement_of(const Scene& scene, std::size_t index, const Surfaces:
 
 }  // namespace
 
-GpuSurfaces::GpuSurfaces(const GpuDevice& device, const Scene& scene, const Surfaces& surfaces) {
-  GpuUploads uploads(device, buffers_);
+GpuSurfaces::GpuSurfaces(const GpuDevice& device, const Scene& scene, const Surfaces& surfaces) : tables_(device) {
   MeshUploads meshes;
   std::vector<MeshArrays> arrays;
   for (std::uint32_t i = 0; i < scene.meshes.size(); ++i) {
     arrays.push_back(meshes.add(scene.meshes[i], surfaces.parts(i)));
   }
-  meshes.put(uploads);
+  meshes.put(tables_);
   std::vector<GpuPlacement> placements;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     placements.push_back(placement_of(scene, i, surfaces.placed()[i]));
     placements.back().arrays = meshes.addresses(arrays[scene.instances[i].mesh]);
   }
   const RaySpace& space = surfaces.space();
-  (void)uploads.put_one(GpuSurfaceTable{uploads.put(placements), space.origin, space.scale,
-                                        static_cast<std::uint32_t>(placements.size()), surfaces.lifts() ? 1U : 0U});
+  address_ =
+      tables_.upload_one(GpuSurfaceTable{tables_.upload(placements), space.origin, space.scale,
+                                         static_cast<std::uint32_t>(placements.size()), surfaces.lifts() ? 1U : 0U});
 }
 
 }  // namespace hpr

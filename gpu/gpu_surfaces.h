@@ -1,10 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
-#include "gpu/gpu_buffer.h"
 #include "gpu/gpu_device.h"
+#include "gpu/gpu_tables.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 
@@ -19,10 +18,11 @@ class GpuSurfaces {
   GpuSurfaces(const GpuDevice& device, const Scene& scene, const Surfaces& surfaces);
 
   /// As SurfaceTables of surfaces.glsl.
-  [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
+  [[nodiscard]] std::uint64_t address() const { return address_; }
 
  private:
-  std::vector<GpuBuffer> buffers_;  ///< the last one is the table
+  GpuTables tables_;
+  std::uint64_t address_ = 0;
 };
 
 }  // namespace hpr

@@ -22,6 +22,14 @@ class GpuTables {
     static_assert(std::is_trivially_copyable_v<T>);
     return upload_bytes(std::as_bytes(values));
   }
+  template <typename T>
+  std::uint64_t upload(const std::vector<T>& values) {
+    return upload(std::span<const T>(values));
+  }
+  template <typename T>
+  std::uint64_t upload_one(const T& value) {
+    return upload(std::span<const T>(&value, 1));
+  }
 
  private:
   std::uint64_t upload_bytes(std::span<const std::byte> bytes);
