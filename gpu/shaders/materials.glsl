@@ -339,7 +339,8 @@ bool has_effect(ExtensionPoint point) {
 void add_extensions(Materials materials, Material material, SurfacePoint surface, inout MaterialPoint point) {
   const double kHalfOfTwentieth = 0.025lf;
   if (material.thickness > 0.0 && point.ior > 1.0lf) {
-    point.ior_spread = kHalfOfTwentieth * double(materials.extensions.items[material.extensions].dispersion) * (point.ior - 1.0lf);
+    double dispersion = double(materials.extensions.items[material.extensions].dispersion);
+    point.ior_spread = kHalfOfTwentieth * dispersion * (point.ior - 1.0lf);
   }
   ExtensionPoint read = read_extensions(materials, material.extensions, surface, point.normal);
   if (!has_effect(read)) return;
