@@ -48,15 +48,13 @@ struct Query {
   double previous_pdf;
   double gather_reach;
   double radius;
-  double roughness;
-  double glossy_cutoff;
   GpuReflectionTerms terms;
   std::uint32_t layer;
   std::uint32_t which;
   std::uint32_t gathers;
-  std::uint32_t is_delta;
+  std::uint32_t padding;
 };
-static_assert(sizeof(Query) == 248);
+static_assert(sizeof(Query) == 232);
 
 /// As photon_light.comp writes them.
 struct Answer {
@@ -97,6 +95,7 @@ struct Gather {
 
   [[nodiscard]] Query query() const {
     const Bsdf& bsdf = vertex.bsdf;
+    const auto shows = [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); };
     return {vertex.surface.position,
             vertex.surface.geometric_normal,
             vertex.material.normal,
@@ -104,13 +103,11 @@ struct Gather {
             vertex.previous_pdf,
             vertex.gather_reach,
             radius,
-            bsdf.roughness(),
-            glossy_cutoff,
-            GpuReflectionTerms(bsdf.reflection_terms(true, true)),
+            GpuReflectionTerms(bsdf.reflection_terms(shows(Lobe::Diffuse), shows(Lobe::Reflection))),
             vertex.surface.layer,
             which,
             gathers ? 1U : 0U,
-            bsdf.is_delta(Lobe::Reflection) ? 1U : 0U};
+            0};
   }
 };
 

@@ -16,13 +16,11 @@ struct Query {
   double previous_pdf;
   double gather_reach;
   double radius;
-  double roughness;
-  double glossy_cutoff;
   ReflectionTerms terms;
   uint layer;
   uint which;  // the map; or past the last one: all of them, as paths gather them
   uint gathers;
-  uint is_delta;
+  uint padding;
 };
 struct Answer {
   dvec3 light;
@@ -50,19 +48,17 @@ void main() {
   surface.position = query.position;
   surface.geometric_normal = query.geometric_normal;
   surface.layer = query.layer;
-  ReflectionTerms terms = query.terms;
-  terms.specular = terms.specular && !is_followed(query.roughness, query.is_delta != 0u, query.glossy_cutoff);
   bool done = true;
   uint found = 0u;
   dvec3 light;
   if (query.which < kPhotonMaps) {
     PhotonMap map = photons.maps[query.which];
-    light = gather_photons(map, query.radius, surface, terms, query.shading_normal, done);
+    light = gather_photons(map, query.radius, surface, query.terms, query.shading_normal, done);
     PhotonSearch search = search_photons(map, surface.position, surface.geometric_normal, surface.layer, query.radius);
     while (next_photon(map, search)) ++found;
     done = done && search_is_done(search);
   } else {
-    light = light_by_photons(photons, surface, terms, query.shading_normal, query.gathers != 0u, query.gather_reach,
+    light = light_by_photons(photons, surface, query.terms, query.shading_normal, query.gathers != 0u, query.gather_reach,
                              query.previous_position, query.previous_pdf, done);
   }
   to.answers[uint(i)] = Answer(light, found, done ? 1u : 0u);

@@ -180,17 +180,12 @@ bool search_is_done(PhotonSearch search) {
   return search.row == kPhotonRows && search.next == search.end;
 }
 
-// Whether the eye's paths follow a lobe that mirrors. They never follow the diffuse one, and always those that let light through.
-bool is_followed(double roughness, bool is_delta, double glossy_cutoff) {
-  return roughness < glossy_cutoff || is_delta;
-}
-
 // W/m^2 per flux unit.
 double photon_density(PhotonMap map, double radius) {
   return radius > 0.0lf ? 2.0lf / (kPi * radius * radius) * map.flux_unit : 0.0lf;
 }
 
-// The radiance towards the viewer that `terms`, which have the lobes not followed alone, make of the photons about `surface`.
+// The radiance towards the viewer that `terms`, of the lobes that no ray follows alone, make of the photons about `surface`.
 // Never NaN. `done` becomes false where a device ended the search too early.
 dvec3 gather_photons(PhotonMap map, double radius, SurfacePoint surface, ReflectionTerms terms, dvec3 shading_normal,
                      inout bool done) {
