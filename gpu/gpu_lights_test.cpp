@@ -1,95 +1,41 @@
+#include "gpu/gpu_lights.h"
+
 #include <hpr/shaders/environment_samples.h>
+#include <hpr/shaders/light_samples.h>
 #include <hpr/shaders/punctual_samples.h>
 #include <hpr/shaders/tree_choices.h>
+#include <hpr/shaders/triangle_samples.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
-#include <limits>
+#include <memory>
 #include <numbers>
-#include <random>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "gpu/gpu_materials.h"
 #include "gpu/light_tables.h"
 #include "gpu/test_kernels.h"
+#include "gpu/test_lights.h"
 #include "rt/lights/environment_map.h"
+#include "rt/lights/light_sampler.h"
 #include "rt/lights/light_tree.h"
 #include "rt/lights/punctual_light.h"
+#include "rt/lights/triangle_lights.h"
 #include "rt/sampling/sampling.h"
 
 namespace hpr {
 namespace {
 
+using test::any_normal;
+using test::Errors;
+using test::kInputs;
+using test::Random;
+using test::spread;
 using GpuLightsTest = test::OnGpu;
-
-constexpr std::size_t kInputs = 100'000;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// Random numbers of the kinds lights and places have.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-
-  /// In [0, 1).
-  double one() { return std::generate_canonical<double, 53>(engine_); }
-  std::uint32_t below(std::uint32_t count) { return static_cast<std::uint32_t>(one() * count); }
-  bool chance(double probability) { return one() < probability; }
-  glm::dvec2 two() {
-    const double x = one();
-    return {x, one()};
-  }
-  /// Between two positive numbers, each power of ten as often.
-  double spread(double low, double high) { return low * std::pow(high / low, one()); }
-  glm::dvec3 direction() {
-    const double x = one();
-    return warp::on_sphere({x, one()});
-  }
-  /// Of a surface: zero, along an axis, or any.
-  glm::dvec3 normal() {
-    if (chance(0.1)) return glm::dvec3(0.0);
-    if (chance(0.1)) {
-      glm::dvec3 axis(0.0);
-      axis[static_cast<int>(below(3))] = chance(0.5) ? 1.0 : -1.0;
-      return axis;
-    }
-    return direction();
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
-
-/// Keeps the largest error of many numbers, relative to the expected ones; below `floor` to that.
-class Errors {
- public:
-  double of(double found, double expected, double floor = 1e-300) {
-    if (found == expected) return 0.0;
-    const double error = std::abs(found - expected) / std::max(std::abs(expected), floor);
-    return std::isfinite(error) ? error : kInfinity;
-  }
-  void add(double found, double expected, double floor = 1e-300) { add(of(found, expected, floor)); }
-  /// Relative to the vector's length.
-  void add(const glm::dvec3& found, const glm::dvec3& expected, double floor = 1e-300) {
-    const double size = std::max(glm::length(expected), floor);
-    for (int k = 0; k < 3; ++k) add(of(found[k], expected[k], size));
-  }
-  [[nodiscard]] double largest() const { return largest_; }
-  /// How many exceed 1e-9.
-  [[nodiscard]] std::size_t large() const { return large_; }
-
- private:
-  void add(double error) {
-    largest_ = std::max(largest_, error);
-    if (error > 1e-9) ++large_;
-  }
-
-  double largest_ = 0.0;
-  std::size_t large_ = 0;
-};
 
 /// As tree_choices.comp has them.
 struct TreeQuery {
@@ -111,16 +57,16 @@ struct TreeAnswer {
 std::vector<LightBounds> random_lights(Random& random, std::size_t count) {
   std::vector<LightBounds> lights(count);
   for (LightBounds& light : lights) {
-    const glm::dvec3 center = 10.0 * random.one() * random.direction();
-    const glm::dvec3 half = random.chance(0.5) ? glm::dvec3(0.0) : random.spread(1e-6, 1.0) * abs(random.direction());
+    const glm::dvec3 center = 10.0 * random.number() * random.direction();
+    const glm::dvec3 half = random.chance(0.5) ? glm::dvec3(0.0) : spread(random, 1e-6, 1.0) * abs(random.direction());
     light.low = center - half;
     light.high = center + half;
-    light.strength = random.spread(1e-6, 1e3);
+    light.strength = spread(random, 1e-6, 1e3);
     light.axis = random.direction();
-    if (random.chance(0.3)) light.spread_radians = std::numbers::pi * random.one();
-    if (random.chance(0.3)) light.emission_radians = random.one();
+    if (random.chance(0.3)) light.spread_radians = std::numbers::pi * random.number();
+    if (random.chance(0.3)) light.emission_radians = random.number();
     light.two_sided = random.chance(0.3);
-    if (random.chance(0.2)) light.reach = random.spread(0.1, 30.0);
+    if (random.chance(0.2)) light.reach = spread(random, 0.1, 30.0);
   }
   return lights;
 }
@@ -137,14 +83,14 @@ TEST_F(GpuLightsTest, TreesChooseAsOnTheCpu) {
     const GpuLightTree there = upload_light_tree(tables, tree);
     std::vector<TreeQuery> queries(kInputs / 4);
     for (TreeQuery& query : queries) {
-      query.position = random.spread(1e-3, 1e3) * random.direction();
-      query.light = random.below(static_cast<std::uint32_t>(count));
+      query.position = spread(random, 1e-3, 1e3) * random.direction();
+      query.light = random.below(count);
       const LightBounds& near = lights[query.light];
       if (random.chance(0.3))
-        query.position = 0.5 * (near.low + near.high) + random.spread(1e-9, 1.0) * random.direction();
+        query.position = 0.5 * (near.low + near.high) + spread(random, 1e-9, 1.0) * random.direction();
       if (random.chance(0.01)) query.position = near.low;
-      query.normal = random.normal();
-      query.u = random.one();
+      query.normal = any_normal(random);
+      query.u = random.number();
     }
     const auto found = test::map_on_gpu<TreeAnswer>(device(), tree_choices, std::span<const TreeQuery>(queries),
                                                     tables.upload(std::span(&there, 1)));
@@ -164,7 +110,7 @@ TEST_F(GpuLightsTest, TreesChooseAsOnTheCpu) {
   }
   EXPECT_EQ(errors.large(), 0U) << errors.largest();
   EXPECT_LE(others, 3U) << "random numbers at the edge of two choices";
-  EXPECT_GT(chosen, kInputs / 2);
+  EXPECT_GT(chosen, kInputs / 3);
 }
 
 /// As punctual_samples.comp has them.
@@ -186,32 +132,18 @@ struct PunctualAnswer {
   std::uint32_t is_fixed;
 };
 
-Light random_light(Random& random) {
-  Light light;
-  light.type = static_cast<LightType>(random.below(4));
-  light.position = random.spread(1e-2, 1e4) * random.direction();
-  light.direction = glm::vec3(random.direction());
-  light.intensity = glm::vec3(random.spread(1e-3, 1e5) * abs(random.direction()));
-  if (random.chance(0.3)) light.range = random.spread(0.1, 1e3);
-  light.outer_cone_radians = static_cast<float>(random.chance(0.2) ? random.spread(1e-4, 0.1) : 1.57 * random.one());
-  light.inner_cone_radians = light.outer_cone_radians * static_cast<float>(random.one());
-  if (random.chance(0.5)) light.radius = random.spread(1e-9, 10.0);
-  if (random.chance(0.5)) light.angular_radius_radians = static_cast<float>(random.spread(1e-4, 1.57));
-  return light;
-}
-
 /// Near, far, inside the light's sphere, on its very place, in and at the edge of its cone.
 glm::dvec3 random_position(Random& random, const Light& light) {
   if (random.chance(0.01)) return light.position;
   if (random.chance(0.2) && light.radius > 0.0) {
-    return light.position + light.radius * random.spread(0.5, 2.0) * random.direction();
+    return light.position + light.radius * spread(random, 0.5, 2.0) * random.direction();
   }
   if (random.chance(0.5)) {
-    const double angle = light.outer_cone_radians * (random.chance(0.2) ? 1.0 : random.one());
-    return light.position + random.spread(1e-2, 1e3) *
-                                warp::in_cone(glm::dvec3(light.direction), 1.0 - std::cos(angle), {1.0, random.one()});
+    const double angle = light.outer_cone_radians * (random.chance(0.2) ? 1.0 : random.number());
+    return light.position + spread(random, 1e-2, 1e3) * warp::in_cone(glm::dvec3(light.direction),
+                                                                      1.0 - std::cos(angle), {1.0, random.number()});
   }
-  return light.position + random.spread(1e-6, 1e6) * random.direction();
+  return light.position + spread(random, 1e-6, 1e6) * random.direction();
 }
 
 TEST_F(GpuLightsTest, PunctualLightsAreSampledAsOnTheCpu) {
@@ -219,11 +151,11 @@ TEST_F(GpuLightsTest, PunctualLightsAreSampledAsOnTheCpu) {
   std::vector<Light> lights(kInputs);
   std::vector<PunctualQuery> queries(kInputs);
   for (std::size_t i = 0; i < kInputs; ++i) {
-    lights[i] = random_light(random);
+    lights[i] = test::random_light(random);
     PunctualQuery& query = queries[i];
     query.position = random_position(random, lights[i]);
     query.u = random.chance(0.05) ? glm::dvec2(0.0) : random.two();
-    query.eye = random.chance(0.01) ? query.position : random.spread(0.1, 1e3) * random.direction();
+    query.eye = random.chance(0.01) ? query.position : spread(random, 0.1, 1e3) * random.direction();
     query.back = random.direction();
     query.orthographic = random.chance(0.3) ? 1 : 0;
     query.light = punctual_light_of(lights[i]);
@@ -271,40 +203,6 @@ struct EnvironmentAnswer {
   std::uint32_t padding;
 };
 
-/// One pixel; an even picture; a pattern of few pixels; one bright texel in a dim sky, and in a black one; a column.
-std::vector<Environment> environments() {
-  std::vector<Environment> all;
-  all.push_back({Image<Rgb>({1, 1}, {0.5F, 1.0F, 2.0F})});
-  all.push_back({Image<Rgb>({1, 1})});
-  all.push_back({Image<Rgb>({64, 32}, {1.0F, 0.5F, 0.25F})});
-  Environment pattern{Image<Rgb>({7, 5})};
-  Environment hills{Image<Rgb>({200, 100})};
-  for (Environment* each : {&pattern, &hills}) {
-    const Size size = each->image.size();
-    for (int y = 0; y < size.height; ++y) {
-      for (int x = 0; x < size.width; ++x) {
-        const auto value = static_cast<float>((x * 5 + y * 3) % 7);
-        each->image.at(x, y) = {value, static_cast<float>(x % 3), y < size.height / 2 ? 0.25F * value : 0.0F};
-      }
-    }
-    each->rotation_radians = 0.7;
-    each->scale = 2.0;
-  }
-  all.push_back(pattern);
-  all.push_back(hills);
-  Environment sunny{Image<Rgb>({128, 64}, {0.1F, 0.2F, 0.3F})};
-  sunny.image.at(40, 11) = {5e4F, 4e4F, 3e4F};
-  sunny.rotation_radians = -2.0;
-  all.push_back(sunny);
-  Environment night{Image<Rgb>({16, 8})};
-  night.image.at(15, 7) = {5.0F, 5.0F, 5.0F};
-  all.push_back(night);
-  Environment bands{Image<Rgb>({1, 9})};
-  for (int y = 0; y < 9; ++y) bands.image.at(0, y) = {static_cast<float>(y % 4), 1.0F, 0.0F};
-  all.push_back(bands);
-  return all;
-}
-
 /// How far a direction lies from where its texel or the rounding of a normal changes: there the density jumps.
 bool jumps(const EnvironmentMap& map, const glm::dvec3& direction, const glm::dvec3& normal, double pdf) {
   for (int k = 0; k < 6; ++k) {
@@ -317,15 +215,15 @@ bool jumps(const EnvironmentMap& map, const glm::dvec3& direction, const glm::dv
 
 TEST_F(GpuLightsTest, EnvironmentsAreSampledAsOnTheCpu) {
   Random random(13);
-  const std::vector<Environment> all = environments();
+  const std::vector<Environment> all = test::environments();
   for (const Environment& environment : all) {
     const EnvironmentMap map(environment);
     GpuTables tables(device());
     const GpuEnvironment there = upload_environment(tables, map);
     std::vector<EnvironmentQuery> queries(kInputs / all.size());
     for (EnvironmentQuery& query : queries) {
-      query.normal = random.normal();
-      query.choice = random.one();
+      query.normal = any_normal(random);
+      query.choice = random.number();
       query.u = random.two();
       query.direction = random.direction();
       if (random.chance(0.3))
@@ -366,6 +264,257 @@ TEST_F(GpuLightsTest, EnvironmentsAreSampledAsOnTheCpu) {
     EXPECT_GT(sampled, queries.size() / 4) << size;
     EXPECT_GE(dense, brightest > 0.0 ? queries.size() / 5 : 0) << size;
   }
+}
+
+/// As triangle_samples.comp has them.
+struct TriangleQuery {
+  glm::dvec3 position;
+  glm::dvec2 u;
+  std::uint32_t triangle;
+  std::uint32_t surface;
+};
+struct TriangleAnswer {
+  glm::dvec3 to_light;
+  double distance;
+  glm::dvec3 goal;
+  double offset;
+  glm::dvec3 weight;
+  double pdf;
+  double pdf_of_goal;
+  double solid_angle;
+  std::uint32_t found;
+  std::uint32_t can_sample;
+};
+
+TEST_F(GpuLightsTest, TrianglesAreSampledAsOnTheCpu) {
+  Random random(14);
+  const Scene scene = test::with_triangles(random, 40);
+  const TriangleLights triangles(scene);
+  ASSERT_GT(triangles.size(), 300U);
+  const GpuMaterials materials(device(), scene);
+  GpuTables tables(device());
+  const std::vector<GpuTriangleLight> there = triangle_lights_of(scene, triangles);
+  std::vector<TriangleQuery> queries(kInputs);
+  for (TriangleQuery& query : queries) {
+    query.triangle = random.below(triangles.size());
+    query.position = test::position_about(random, triangles[query.triangle]);
+    query.u = random.two();
+    query.surface = random.below(scene.triangles + 3);
+  }
+  const auto found = test::map_on_gpu<TriangleAnswer>(
+      device(), triangle_samples, std::span<const TriangleQuery>(queries), tables.upload(std::span(there)),
+      materials.address(), std::uint64_t{there.size()});
+  Errors errors;
+  Errors textured;
+  std::size_t others = 0;
+  std::size_t by_angle = 0;
+  std::size_t by_area = 0;
+  std::array<std::size_t, 5> lit{};
+  for (std::size_t i = 0; i < kInputs; ++i) {
+    const TriangleQuery& query = queries[i];
+    const TriangleLight& triangle = triangles[query.triangle];
+    const LightSample expected = triangles.sample(query.triangle, query.position, query.u);
+    const SphericalTriangle seen(query.position, triangle.v0, triangle.e1, triangle.e2);
+    const auto which = triangles.find(query.surface);
+    ASSERT_EQ(found[i].found, which ? static_cast<std::uint32_t>(*which) : 0xFFFFFFFFU) << i;
+    // Seen edge-on, as a difference of nearly equal numbers.
+    errors.add(found[i].solid_angle, seen.solid_angle(), 1e-6);
+    if ((found[i].can_sample != 0) != seen.can_sample()) {
+      ++others;
+      continue;
+    }
+    errors.add(found[i].pdf_of_goal,
+               triangles.pdf(query.triangle, query.position, triangle.v0 + 0.25 * triangle.e1 + 0.25 * triangle.e2));
+    const double size = glm::length(triangle.e1) + glm::length(triangle.e2) + expected.distance;
+    // Points are rounded by the triangle's size, directions to near ones the more.
+    errors.add(found[i].to_light, expected.to_light, size / expected.distance);
+    errors.add(found[i].distance, expected.distance, size);
+    errors.add(found[i].goal, expected.goal, size);
+    errors.add(found[i].offset, expected.offset);
+    errors.add(found[i].pdf, expected.pdf);
+    const std::uint32_t material = scene.mesh_of(scene.instances[triangle.instance]).material;
+    const bool is_lit = expected.weight != glm::dvec3(0.0);
+    if (is_lit != (found[i].weight != glm::dvec3(0.0))) {
+      ++others;
+    } else {
+      (material < 2 ? errors : textured).add(found[i].weight, expected.weight, 1e-3 / std::max(expected.pdf, 1e-3));
+    }
+    if (!is_lit) continue;
+    ++(seen.can_sample() ? by_angle : by_area);
+    ++lit.at(material);
+  }
+  // Where u.x cuts off next to nothing of a small triangle, both have few digits of how much that is.
+  EXPECT_LE(errors.large(), 10U) << errors.largest();
+  EXPECT_LT(errors.largest(), 1e-6);
+  EXPECT_LT(textured.large(), kInputs / 100) << "coordinates are rounded to single precision: " << textured.largest();
+  EXPECT_LT(textured.largest(), 1e-3);
+  EXPECT_LE(others, 3U) << "triangles at the edge of what is sampled by angle, or of what is cut out";
+  EXPECT_GT(by_angle, kInputs / 5);
+  EXPECT_GT(by_area, kInputs / 20);
+  for (const std::size_t each : lit) EXPECT_GT(each, kInputs / 40);
+}
+
+/// As light_samples.comp has them.
+struct LightQuery {
+  glm::dvec3 position;
+  glm::dvec3 normal;
+  glm::dvec3 direction;
+  glm::dvec3 hit;
+  double choice;
+  glm::dvec2 u;
+  std::uint32_t surface;
+  std::uint32_t enumerated;
+};
+struct GpuLightSample {
+  glm::dvec3 to_light;
+  double distance;
+  glm::dvec3 goal;
+  double offset;
+  glm::dvec3 weight;
+  double pdf;
+  std::uint32_t casts_shadows;
+  std::uint32_t chosen;
+};
+struct LightAnswer {
+  GpuLightSample one;
+  GpuLightSample enumerated;
+  glm::dvec3 environment;
+  double environment_pdf;
+  double surface_pdf;
+  std::uint32_t enumerated_count;
+  std::uint32_t enumerated_is_fixed;
+  std::uint32_t has_tree;
+  std::uint32_t padding;
+};
+
+/// Whether all but the weight of a sample is the same but for rounding; adds the errors of weight and density.
+bool add_sample(Errors& errors, const GpuLightSample& found, const LightSample& expected, double size) {
+  const double apart = glm::length(found.to_light - expected.to_light);
+  if (!(apart < 1e-6)) return false;  // of another light, or another part of one
+  errors.add(found.to_light, expected.to_light, std::max(1.0, 10.0 / expected.distance));
+  errors.add(found.distance, expected.distance, 1e-3 * size);
+  errors.add(found.goal, expected.goal, size);
+  errors.add(found.offset, expected.offset);
+  errors.add(found.pdf, expected.pdf, 1e-6);
+  errors.add(found.weight, expected.weight, 1e-6);
+  return (found.casts_shadows != 0) == expected.casts_shadows;
+}
+
+struct LightScene {
+  Scene scene;
+  ConstantEnvironment constant = ConstantEnvironment::Sampled;
+};
+
+/// None but the headlight; few lights of all kinds; many of them; an environment and nothing else; a constant one left
+/// to rays; triangles alone.
+std::vector<LightScene> light_scenes(Random& random) {
+  std::vector<LightScene> all(6);
+  all[0].scene = test::white_floor();
+  all[1].scene = test::with_triangles(random, 5, 2);
+  all[2].scene = test::with_triangles(random, 5, 2);
+  all[3].scene = test::white_floor();
+  all[4].scene = test::with_triangles(random, 1, 2);
+  all[5].scene = test::with_triangles(random, 50, 2);
+  const std::vector<Environment> skies = test::environments();
+  all[1].scene.environment = skies[5];
+  all[2].scene.environment = skies[4];
+  all[3].scene.environment = skies[0];
+  all[4].scene.environment = skies[0];
+  all[4].constant = ConstantEnvironment::LeftToRays;
+  for (Scene* scene : {&all[1].scene, &all[2].scene}) {
+    const std::size_t count = scene == &all[1].scene ? 20 : 300;
+    while (scene->lights.size() < count) {
+      Light light = test::random_light(random);
+      if (light.type == LightType::Headlight) continue;
+      light.position = 10.0 * random.number() * random.direction();
+      scene->lights.push_back(light);
+    }
+  }
+  all[5].scene.background = {0.1F, 0.2F, 0.3F};
+  return all;
+}
+
+TEST_F(GpuLightsTest, ScenesAreLitAsOnTheCpu) {
+  Random random(15);
+  const std::vector<LightScene> all = light_scenes(random);
+  View view;
+  view.eye = {1.0, 2.0, 3.0};
+  for (std::size_t number = 0; number < all.size(); ++number) {
+    const Scene& scene = all[number].scene;
+    const LightSampler sampler(scene, all[number].constant);
+    const GpuMaterials materials(device(), scene);
+    const GpuLights lights(device(), scene, sampler, materials);
+    EXPECT_FALSE(lights.has_coated());
+    std::vector<LightQuery> queries(kInputs / all.size());
+    for (LightQuery& query : queries) {
+      query.position = spread(random, 1e-2, 100.0) * random.direction();
+      query.normal = any_normal(random);
+      query.direction = random.direction();
+      query.choice = random.number();
+      query.u = random.two();
+      query.surface = random.below(scene.triangles);
+      query.enumerated = random.below(20);
+      if (sampler.triangles().size() > 0 && random.chance(0.9)) {
+        const TriangleLight& triangle = sampler.triangles()[random.below(sampler.triangles().size())];
+        if (random.chance(0.3)) query.position = test::position_about(random, triangle);
+        query.surface = triangle.surface;
+        query.hit = triangle.v0 + 0.25 * (triangle.e1 + triangle.e2);
+      }
+    }
+    const auto found =
+        test::map_on_gpu<LightAnswer>(device(), light_samples, std::span<const LightQuery>(queries), lights.address());
+    Errors errors;
+    std::size_t sampled = 0;
+    std::size_t met = 0;
+    std::size_t others = 0;
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+      const LightQuery& query = queries[i];
+      const LightAnswer& answer = found[i];
+      const double size = 40.0 + glm::length(query.position);
+      ASSERT_EQ(answer.enumerated_count, sampler.enumerated());
+      ASSERT_EQ(answer.has_tree != 0, sampler.has_tree());
+      if (query.enumerated < sampler.enumerated()) {
+        const LightSample expected = sampler.sample_enumerated(query.enumerated, query.position, view, query.u);
+        ASSERT_EQ(answer.enumerated_is_fixed != 0, sampler.enumerated_is_fixed(query.enumerated));
+        if (!add_sample(errors, answer.enumerated, expected, size)) ++others;
+      }
+      const auto expected = sampler.sample(query.position, query.normal, view, query.choice, query.u);
+      if (expected.has_value() != (answer.one.chosen != 0)) {
+        ++others;
+      } else if (expected) {
+        ++sampled;
+        if (!add_sample(errors, answer.one, *expected, size)) ++others;
+      }
+      errors.add(answer.environment, sampler.environment(query.direction), 1e-3);
+      errors.add(answer.environment_pdf, sampler.environment_pdf(query.position, query.normal, query.direction), 1e-6);
+      SurfacePoint hit;
+      hit.position = query.hit;
+      const double pdf = sampler.surface_pdf(query.position, query.normal, query.surface, hit);
+      errors.add(answer.surface_pdf, pdf, 1e-9);
+      if (pdf > 0.0) ++met;
+    }
+    EXPECT_LE(errors.large(), 2U) << errors.largest() << ", scene " << number;
+    EXPECT_LE(others, 5U) << "at the edge of two choices, scene " << number;
+    if (sampler.has_tree()) {
+      EXPECT_GT(sampled, queries.size() / 20) << number;
+    }
+    if (sampler.triangles().size() > 0) {
+      EXPECT_GT(met, queries.size() / 10) << number;
+    }
+  }
+}
+
+TEST_F(GpuLightsTest, CoatedTrianglesAreReported) {
+  Scene scene;
+  Material coated = test::glowing({1.0F, 1.0F, 1.0F});
+  auto extensions = std::make_shared<MaterialExtensions>();
+  extensions->clearcoat = 0.5F;
+  coated.extensions = extensions;
+  test::place_mesh(
+      scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, test::add_material(scene, coated))));
+  finish_scene(scene);
+  const GpuMaterials materials(device(), scene);
+  EXPECT_TRUE(GpuLights(device(), scene, LightSampler(scene), materials).has_coated());
 }
 
 }  // namespace

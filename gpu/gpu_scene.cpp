@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "gpu/bvh.h"
-#include "gpu/gpu_tables.h"
+#include "gpu/gpu_upload.h"
 
 namespace hpr {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "gpu/gpu_device.h"
-#include "gpu/gpu_tables.h"
+#include "gpu/gpu_upload.h"
 #include "scene/scene.h"
 
 namespace hpr {

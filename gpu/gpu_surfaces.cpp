@@ -9,7 +9,7 @@
 #include <span>
 
 #include "core/error.h"
-#include "gpu/gpu_tables.h"
+#include "gpu/gpu_upload.h"
 #include "scene/bounds.h"
 
 namespace hpr {

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "gpu/gpu_device.h"
-#include "gpu/gpu_tables.h"
+#include "gpu/gpu_upload.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 

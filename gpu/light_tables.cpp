@@ -14,8 +14,7 @@ GpuLightTree upload_light_tree(GpuTables& tables, const LightTree& tree) {
                      lights.cos_spread, lights.sin_spread, lights.cos_emission, lights.two_sided ? 1U : 0U, node.second,
                      node.light});
   }
-  return {tables.upload(std::span<const GpuLightNode>(nodes)), tables.upload(tree.leaves()),
-          static_cast<std::uint32_t>(nodes.size())};
+  return {tables.upload(std::span(nodes)), tables.upload(tree.leaves()), static_cast<std::uint32_t>(nodes.size())};
 }
 
 GpuPunctualLight punctual_light_of(const Light& light) {
@@ -28,6 +27,34 @@ GpuPunctualLight punctual_light_of(const Light& light) {
           light.outer_cone_radians,
           light.angular_radius_radians,
           static_cast<std::uint32_t>(light.type)};
+}
+
+std::vector<GpuTriangleLight> triangle_lights_of(const Scene& scene, const TriangleLights& triangles) {
+  std::vector<GpuTriangleLight> made(triangles.size());
+  for (std::size_t i = 0; i < made.size(); ++i) {
+    const TriangleLight& from = triangles[i];
+    const Mesh& mesh = scene.mesh_of(scene.instances[from.instance]);
+    const glm::uvec3& corners = mesh.triangles[from.index];
+    GpuTriangleLight& light = made[i];
+    light.v0 = from.v0;
+    light.e1 = from.e1;
+    light.e2 = from.e2;
+    light.normal = from.normal;
+    light.area = from.area;
+    light.offset = from.offset;
+    light.has_colors = mesh.colors.empty() ? 0 : 1;
+    light.material = mesh.material;
+    light.surface = from.surface;
+    light.two_sided = from.two_sided ? 1 : 0;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const std::uint32_t vertex = corners[static_cast<int>(corner)];
+      if (light.has_colors != 0) light.alpha.at(corner) = mesh.colors[vertex].a;
+      for (std::size_t set = 0; set < mesh.uvs.size(); ++set) {
+        if (!mesh.uvs.at(set).empty()) light.uv.at(set).at(corner) = mesh.uvs.at(set)[vertex];
+      }
+    }
+  }
+  return made;
 }
 
 GpuEnvironment upload_environment(GpuTables& tables, const EnvironmentMap& map) {

@@ -1,12 +1,15 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <vector>
 
-#include "gpu/gpu_tables.h"
+#include "gpu/gpu_upload.h"
 #include "rt/lights/environment_map.h"
 #include "rt/lights/light_tree.h"
+#include "rt/lights/triangle_lights.h"
 #include "scene/scene.h"
 
 /// What lights are sampled by, laid out as shaders read it: plain data, and addresses of more of it.
@@ -70,8 +73,28 @@ struct GpuEnvironment {
 };
 static_assert(sizeof(GpuEnvironment) == 112);
 
+/// As TriangleLight of triangle_lights.glsl.
+struct GpuTriangleLight {
+  glm::dvec3 v0{0.0};
+  glm::dvec3 e1{0.0};
+  glm::dvec3 e2{0.0};
+  glm::dvec3 normal{0.0};
+  double area = 0.0;
+  double offset = 0.0;
+  std::array<std::array<glm::vec2, 3>, 2> uv{};
+  std::array<float, 3> alpha{};
+  std::uint32_t has_colors = 0;
+  std::uint32_t material = 0;
+  std::uint32_t surface = 0;
+  std::uint32_t two_sided = 0;
+  std::uint32_t padding = 0;
+};
+static_assert(sizeof(GpuTriangleLight) == 192);
+
 [[nodiscard]] GpuLightTree upload_light_tree(GpuTables& tables, const LightTree& tree);
 [[nodiscard]] GpuPunctualLight punctual_light_of(const Light& light);
+/// By surface id. `scene`: whose lights they are.
+[[nodiscard]] std::vector<GpuTriangleLight> triangle_lights_of(const Scene& scene, const TriangleLights& triangles);
 [[nodiscard]] GpuEnvironment upload_environment(GpuTables& tables, const EnvironmentMap& map);
 
 }  // namespace hpr
