@@ -366,6 +366,14 @@ void choose_indirect(Session& session, const FrameSettings& settings, FramePlan&
                                        plan.rays.gather ? "rays" : "photons", 100.0 * *open));
 }
 
+/// Whether a device lights, where one was asked for, and why not.
+void choose_light(const Session& session, FramePlan& plan) {
+  if (!session.has_gpu() || !needs_light(plan.rays.show)) return;
+  const std::string refusal = session.refusal_of_light(plan.rays);
+  plan.light_on_device = refusal.empty();
+  plan.explained.push_back(refusal.empty() ? "light: on the device" : fmt::format("light: by the CPU ({})", refusal));
+}
+
 void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan& plan) {
   auto& lines = plan.explained;
   lines.push_back(fmt::format("pass {}: {} ({})", name_of(pass.pass), pass.runs ? "on" : "off", pass.why));
@@ -496,6 +504,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   fit_photons(session, settings, plan, views);
+  choose_light(session, plan);
   plan_areas(session, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   if (plan.verify_percent > 0.0) {

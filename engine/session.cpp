@@ -18,6 +18,8 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "engine/balance/load_balance.h"
+#include "gpu/gpu_device.h"
+#include "gpu/gpu_light.h"
 #include "gpu/gpu_primary_rays.h"
 #include "raster/chunk_bounds.h"
 #include "raster/gl_context.h"
@@ -95,10 +97,11 @@ void Session::start_vulkan() {
   agree_on_failure(comm_, [&] {
     const trace::Span span("start Vulkan");
     // Who names Vulkan is content with a device on the CPU.
-    gpu_primary_rays_ = std::make_unique<GpuPrimaryRays>(
-        GpuOptions{.device = settings_.device, .local_rank = host_.local_rank, .software = true}, host_.threads);
+    gpu_ = std::make_unique<GpuDevice>(
+        GpuOptions{.device = settings_.device, .local_rank = host_.local_rank, .software = true});
+    gpu_primary_rays_ = std::make_unique<GpuPrimaryRays>(*gpu_, host_.threads);
   });
-  const GpuInfo& device = gpu_primary_rays_->info();
+  const GpuInfo& device = gpu_->info();
   log::debug("Vulkan: {}, {}", device.name, device.driver);
   const auto by_cpu = all_gather_value(comm_, device.software ? 1 : 0);
   if (comm_.rank() != 0) return;
@@ -121,7 +124,13 @@ GpuPrimaryRays& Session::gpu_primary_rays(std::span<const SurfaceRange> objects)
 }
 
 std::string Session::gpu_of_keys() const {
-  return gpu_primary_rays_ && fits_on_gpu(scene_) ? gpu_primary_rays_->info().name : "";
+  return gpu_ && fits_on_gpu(scene_) ? gpu_->info().name : "";
+}
+
+std::string Session::refusal_of_light(const RaySettings& settings) const {
+  if (!gpu_) return "no device was asked for";
+  if (!fits_on_gpu(scene_)) return "no device takes parts of scenes";
+  return hpr::refusal_of_light(scene_, settings, plan_passes(requirements_, settings));
 }
 
 void Session::start_gl() {
@@ -157,8 +166,8 @@ std::string Session::gl_description() const {
 }
 
 std::string Session::gpu() const {
-  if (gpu_primary_rays_ && !gpu_primary_rays_->info().software) {
-    return host_.host + ": " + gpu_primary_rays_->info().name;
+  if (gpu_ && !gpu_->info().software) {
+    return host_.host + ": " + gpu_->info().name;
   }
   return gl_ && !gl_->software() ? host_.host + ": " + gl_->description() : "";
 }
@@ -373,8 +382,15 @@ DeferredShader& Session::shader(const RaySettings& settings) {
     RaySettings own = settings;
     own.threads = host_.threads;
     own.host_ranks = host_.ranks;
+    MakeLightDevice make_device;
+    if (gpu_ && refusal_of_light(own).empty()) {
+      make_device = [this](const LightSources& sources) {
+        return std::make_unique<GpuLight>(*gpu_, sources, host_.threads);
+      };
+    }
     shader_ = std::make_unique<DeferredShader>(
-        scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, forwarding_.get());
+        scene_, own, requirements_, [this]() -> const RayScene& { return ray_scene(ray_build_); }, forwarding_.get(),
+        make_device);
     ray_settings_ = settings;
   }
   return *shader_;

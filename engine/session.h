@@ -25,6 +25,7 @@ class LoadBalance;
 class PrimaryRays;
 class Rasterizer;
 class RayScene;
+class GpuDevice;
 class GpuPrimaryRays;
 class RayForwarding;
 class TileGather;
@@ -105,6 +106,10 @@ class Session {
   [[nodiscard]] std::string gpu_of_keys() const;
   /// That device, with `objects` on it.
   [[nodiscard]] GpuPrimaryRays& gpu_primary_rays(std::span<const SurfaceRange> objects);
+  /// Whether Vulkan was asked for.
+  [[nodiscard]] bool has_gpu() const { return gpu_ != nullptr; }
+  /// Why no device lights by these settings; empty: one does (shader()).
+  [[nodiscard]] std::string refusal_of_light(const RaySettings& settings) const;
   /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where
   /// rays meet a part of the scene.
   [[nodiscard]] Rasterizer& whole_rasterizer();
@@ -167,7 +172,8 @@ class Session {
   HostResources host_;
   Scene scene_;
   Requirements requirements_;
-  std::unique_ptr<GlContext> gl_;  ///< null before start_gl()
+  std::unique_ptr<GpuDevice> gpu_;  ///< null unless Vulkan was asked for
+  std::unique_ptr<GlContext> gl_;   ///< null before start_gl()
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;
   std::unique_ptr<Rasterizer> whole_rasterizer_;

@@ -1,5 +1,10 @@
 #include "gpu/gpu_kernel.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
 #include "core/error.h"
 
 namespace hpr {
@@ -40,6 +45,57 @@ GpuKernel::~GpuKernel() {
   if (device_.is_given_up()) return;
   device_.vk().DestroyPipeline(device_.handle(), pipeline_, nullptr);
   device_.vk().DestroyPipelineLayout(device_.handle(), layout_, nullptr);
+}
+
+namespace {
+
+/// SPIR-V 1.5, section 3.32: an instruction's number, and its operands.
+struct Instruction {
+  std::uint32_t code = 0;
+  std::span<const std::uint32_t> operands;
+};
+constexpr std::uint32_t kName = 5;
+constexpr std::uint32_t kTypeRuntimeArray = 29;
+constexpr std::uint32_t kDecorate = 71;
+constexpr std::uint32_t kArrayStride = 6;
+
+std::vector<Instruction> instructions_of(std::span<const std::uint32_t> spirv) {
+  constexpr std::size_t kHeader = 5;
+  std::vector<Instruction> found;
+  for (std::size_t at = kHeader; at < spirv.size();) {
+    const std::size_t words = spirv[at] >> 16U;
+    HPR_CHECK(words > 0 && at + words <= spirv.size());
+    found.push_back({spirv[at] & 0xFFFFU, spirv.subspan(at + 1, words - 1)});
+    at += words;
+  }
+  return found;
+}
+
+std::string_view text_of(std::span<const std::uint32_t> words) {
+  const auto bytes = std::as_bytes(words);
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): characters are bytes
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return text.substr(0, text.find('\0'));
+}
+
+}  // namespace
+
+std::size_t array_stride(std::span<const std::uint32_t> spirv, std::string_view structure) {
+  const std::vector<Instruction> all = instructions_of(spirv);
+  const auto is_structure = [&](std::uint32_t type) {
+    return std::ranges::any_of(all, [&](const Instruction& each) {
+      return each.code == kName && each.operands[0] == type && text_of(each.operands.subspan(1)) == structure;
+    });
+  };
+  for (const Instruction& array : all) {
+    if (array.code != kTypeRuntimeArray || !is_structure(array.operands[1])) continue;
+    for (const Instruction& each : all) {
+      if (each.code == kDecorate && each.operands[0] == array.operands[0] && each.operands[1] == kArrayStride) {
+        return each.operands[2];
+      }
+    }
+  }
+  throw Error(ExitCode::Internal, fmt::format("a shader has no array of {}", structure));
 }
 
 }  // namespace hpr

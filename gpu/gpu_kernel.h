@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "gpu/gpu_device.h"
 
@@ -32,5 +33,9 @@ class GpuKernel {
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
+
+/// Bytes from one element to the next of the array that a shader's buffer has of structures of this name: what the
+/// buffer is to be made of, where the CPU does not look into it.
+[[nodiscard]] std::size_t array_stride(std::span<const std::uint32_t> spirv, std::string_view structure);
 
 }  // namespace hpr

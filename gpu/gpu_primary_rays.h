@@ -16,13 +16,11 @@
 
 namespace hpr {
 
-/// A device that makes a rank's keys, with the surfaces it holds from frame to frame.
+/// Makes a rank's keys on a device, with the surfaces it holds from frame to frame.
 class GpuPrimaryRays {
  public:
-  /// `threads` build what is put on it.
-  GpuPrimaryRays(const GpuOptions& options, int threads) : device_(options), threads_(threads), keys_(device_) {}
-
-  [[nodiscard]] const GpuInfo& info() const { return device_.info(); }
+  /// `threads` build what is put on it. The device must outlive this.
+  GpuPrimaryRays(const GpuDevice& device, int threads) : device_(device), threads_(threads), keys_(device) {}
 
   /// Draws `objects` from here on. Puts them on the device where it has not got them, and keeps those it drew before.
   /// Throws Error (Limit) where its memory ends.
@@ -35,7 +33,7 @@ class GpuPrimaryRays {
   void draw(const View& view, std::size_t screen, std::span<const Rect> parts, TileLayer<Key>& layer);
 
  private:
-  GpuDevice device_;
+  const GpuDevice& device_;
   int threads_;
   GpuKeys keys_;
   struct Held {

@@ -27,7 +27,7 @@ class OnGpu : public testing::Test {
  protected:
   void SetUp() override {
     if (usable_gpu() < 0) GTEST_SKIP() << "no device that Vulkan can compute on";
-    device_ = std::make_unique<GpuDevice>(GpuOptions{.software = true, .validate = true});
+    device_ = std::make_unique<GpuDevice>(GpuOptions{.software = true, .validate = true, .limit = std::chrono::seconds(300)});
     ASSERT_TRUE(device_->validates()) << "apt-get install vulkan-validationlayers";
   }
   void TearDown() override {

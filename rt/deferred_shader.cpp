@@ -14,6 +14,7 @@
 #include "core/timing.h"
 #include "rt/denoise/coverage_fragments.h"
 #include "rt/denoise/denoiser.h"
+#include "rt/light_device.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/half_resolution.h"
 #include "rt/passes/pass.h"
@@ -64,16 +65,6 @@ ConstantEnvironment constant_environment_of(std::span<const PassPlan> plan) {
 
 }  // namespace
 
-RayCounts& RayCounts::operator+=(const RayCounts& other) {
-  primary += other.primary;
-  for (std::size_t i = 0; i < kPasses; ++i) passes[i] += other.passes[i];
-  invalid += other.invalid;
-  cut += other.cut;
-  not_finite += other.not_finite;
-  first_not_finite = std::min(first_not_finite, other.first_not_finite);
-  return *this;
-}
-
 struct DeferredShader::State {
   const Scene& scene;
   RaySettings settings;
@@ -104,9 +95,10 @@ struct DeferredShader::State {
   std::vector<TileCost> costs;  ///< of the parts that the last shade() shaded
 
   RayForwarding* forwarding;
+  std::unique_ptr<LightDevice> device;  ///< null: the CPU lights all
 
   State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
-        RayForwarding* others);
+        RayForwarding* others, const MakeLightDevice& make_device);
   void build_rays(const RaySource& source);
   const RayScene& build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects);
   void build_photons();
@@ -153,7 +145,7 @@ struct DeferredShader::State {
 };
 
 DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
-                             const RaySource& source, RayForwarding* others)
+                             const RaySource& source, RayForwarding* others, const MakeLightDevice& make_device)
     : scene(lit),
       settings(std::move(chosen)),
       plan(plan_passes(requirements, settings)),
@@ -179,6 +171,7 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
   }
   if (needs_photons(plan)) build_photons();
   if (settings.reference) build_reference();
+  if (make_device) device = make_device({scene, surfaces, lights, settings, plan, followed_lobes});
 }
 
 /// Builds the ray scene of this rank's part of `objects`.
@@ -516,8 +509,8 @@ void DeferredShader::State::gather_counts(double spent_ms) {
 }
 
 DeferredShader::DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements,
-                               const RaySource& rays, RayForwarding* forwarding)
-    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, forwarding)) {}
+                               const RaySource& rays, RayForwarding* forwarding, const MakeLightDevice& make_device)
+    : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, forwarding, make_device)) {}
 DeferredShader::~DeferredShader() = default;
 DeferredShader::DeferredShader(DeferredShader&&) noexcept = default;
 DeferredShader& DeferredShader::operator=(DeferredShader&&) noexcept = default;
@@ -601,7 +594,11 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   }
   const State::Call call = state.start_call(samples);
   const Stopwatch watch;
-  const std::vector<std::size_t> order = fullest_first(tiles, *first.keys, state.settings.threads);
+  RayCounts traced;
+  const std::vector<std::size_t> left =
+      light_on_device(state.device.get(), {samples, tiles, call.eyes, call.photons, is_overtaken}, traced);
+  const double device_ms = watch.ms() * state.settings.threads;
+  const std::vector<std::size_t> order = fullest_first(left, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     if (is_overtaken && is_overtaken()) return;
     const std::span<const std::uint8_t> wanted = mask_of(first.wanted, order[i]);
@@ -610,6 +607,10 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
     state.shade_part(call, {.tile = order[i]});
   });
   state.gather_counts(watch.ms() * state.settings.threads);
+  if (left.size() == tiles.size()) return;
+  state.counts += traced;
+  state.times.push_back({"device", device_ms});
+  for (const std::size_t tile : tiles) state.costs.push_back({tile, device_ms / static_cast<double>(tiles.size())});
 }
 
 void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart& next) {
@@ -630,6 +631,10 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart
 
 bool DeferredShader::is_whole() const {
   return state_->reference || state_->forwarding != nullptr;
+}
+
+bool DeferredShader::lights_on_device() const {
+  return state_->device != nullptr;
 }
 
 bool DeferredShader::shades_whole_tiles() const {

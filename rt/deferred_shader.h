@@ -26,6 +26,11 @@ namespace hpr {
 class Communicator;
 class RayScene;
 class RayForwarding;
+class LightDevice;
+struct LightSources;
+
+/// Makes what lights by a scene's sources in the CPU's stead, see rt/light_device.h; null where that is to be the CPU.
+using MakeLightDevice = std::function<std::unique_ptr<LightDevice>(const LightSources& sources)>;
 
 /// Layers that shading writes, all of one layout; null where not wanted.
 struct LightOutput {
@@ -66,12 +71,13 @@ class DeferredShader {
   /// a planned pass needs them. They outlive the shader.
   using RaySource = std::function<const RayScene&()>;
 
+  /// `make_device`: called once; what it makes lights what it can.
   /// Builds a ray scene of its own if a planned pass needs one and there is no `rays`. The scene must outlive this, and
   /// so must `forwarding`, by which rays reach what is not in `settings.part`: then shade() and this constructor are
   /// collective. Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires
   /// reads every texel once.
   DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {},
-                 RayForwarding* forwarding = nullptr);
+                 RayForwarding* forwarding = nullptr, const MakeLightDevice& make_device = {});
   DeferredShader(const Scene& scene, const RaySettings& settings)
       : DeferredShader(scene, settings, requirements_of(scene)) {}
   ~DeferredShader();
@@ -106,6 +112,8 @@ class DeferredShader {
   void shade(std::span<const ShadedSample> samples, const NextPart& next);
   /// Whether a list of tiles must be shaded as a whole: the reference, and rays that travel.
   [[nodiscard]] bool is_whole() const;
+  /// Whether a device lights tiles: then parts of them are better left to it.
+  [[nodiscard]] bool lights_on_device() const;
   /// Whether no part may be less than a tile: filters look about in it.
   [[nodiscard]] bool shades_whole_tiles() const;
   /// Of the last shade(): what each tile or part took, in no order; nothing of the reference.

@@ -3,10 +3,11 @@
 
 struct Bsdf {
   PlainBsdf plain;
+  bool is_extended;
 };
 
 Bsdf make_bsdf(MaterialPoint material, SurfacePoint surface, bool flux) {
-  return Bsdf(make_plain_bsdf(material, surface, flux));
+  return Bsdf(make_plain_bsdf(material, surface, flux), false);
 }
 
 bool bsdf_present(Bsdf b, uint lobe) {

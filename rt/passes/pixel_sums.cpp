@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <type_traits>
 
 #include "rt/passes/path_vertex.h"
 
@@ -65,6 +64,14 @@ void clear_sums(std::vector<Sum>& sums, std::size_t pixels, std::size_t margins,
   }
 }
 
+/// A tile's pixels, the job's rows of which are 0 unless a mask leaves some as they are.
+template <typename Pixel>
+std::span<Pixel> cleared(const TileJob& job, std::size_t tile, TileLayer<Pixel>& layer) {
+  const std::span<Pixel> pixels = layer.tile(tile);
+  if (job.wanted.empty()) std::ranges::fill(rows_of(job, pixels), Pixel{});
+  return pixels;
+}
+
 }  // namespace
 
 void PixelSums::clear(const TileJob& job, std::size_t tile, std::span<const ShadedSample> samples,
@@ -99,12 +106,7 @@ bool fits_floats(const glm::dvec3& light) {
 }
 
 void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& output, RayCounts& counts) const {
-  const auto start = [&](auto* layer) {
-    const auto pixels = layer->tile(tile);
-    using Pixel = typename std::remove_reference_t<decltype(pixels)>::value_type;
-    if (job.wanted.empty()) std::ranges::fill(rows_of(job, pixels), Pixel{});
-    return pixels;
-  };
+  const auto start = [&](auto* layer) { return cleared(job, tile, *layer); };
   const auto colors = start(output.radiance);
   const std::size_t first = job.first_pixel;
   each_lit(job, [&](std::size_t i) {
@@ -128,6 +130,19 @@ void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& o
     const auto pixels = start(output.coverage);
     each_lit(job, [&](std::size_t i) { pixels[i] = static_cast<float>(1.0 - uncovered[first + i]); });
   }
+}
+
+void store_lit(const TileJob& job, std::size_t tile, std::span<const glm::vec4> pixels, const LightOutput& output,
+               RayCounts& counts) {
+  const std::span<Rgb> colors = cleared(job, tile, *output.radiance);
+  each_lit(job, [&](std::size_t i) {
+    const Rgb color{pixels[i].r, pixels[i].g, pixels[i].b};
+    colors[i] = is_finite(color) ? color : Rgb{};
+    if (!is_finite(color)) count_not_finite(job, i, counts);
+  });
+  if (output.coverage == nullptr) return;
+  const std::span<float> covered = cleared(job, tile, *output.coverage);
+  each_lit(job, [&](std::size_t i) { covered[i] = pixels[i].a; });
 }
 
 void add_first_surfaces(const std::vector<PathVertex>& points, std::size_t tile, const LightOutput& output) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <span>
 #include <vector>
 
@@ -85,6 +86,10 @@ class PixelSums {
     if (is_diffuse && wants_diffuse) diffuse_components[static_cast<std::size_t>(component)][pixel] += light;
   }
 };
+
+/// Stores a sample's pixels that a device has lit (LightDevice), as PixelSums does: of the job's rows of tile `tile`.
+void store_lit(const TileJob& job, std::size_t tile, std::span<const glm::vec4> pixels, const LightOutput& output,
+               RayCounts& counts);
 
 /// Whether a pixel of floats can hold the light; what does not fit is stored as black.
 [[nodiscard]] bool fits_floats(const glm::dvec3& light);

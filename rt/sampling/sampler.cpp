@@ -142,15 +142,18 @@ Sampler Sampler::branch(std::uint32_t which) const {
   return {mixed(stream_ ^ mixed((std::uint64_t{which} << 32U) + drawn_ + 1)), index_};
 }
 
+std::uint64_t frame_stream(const RandomKey& key) {
+  return mixed(mixed(key.seed) ^ key.frame);
+}
+
 std::uint64_t pixel_stream(const RandomKey& key, std::uint32_t screen, int x, int y) {
-  const std::uint64_t frame = mixed(mixed(key.seed) ^ key.frame);
   const std::uint64_t position =
       (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32U) | static_cast<std::uint32_t>(x);
-  return mixed(mixed(frame ^ (std::uint64_t{screen} + 1)) ^ position);
+  return mixed(mixed(frame_stream(key) ^ (std::uint64_t{screen} + 1)) ^ position);
 }
 
 std::uint64_t photon_stream(const RandomKey& key) {
-  return mixed(mixed(mixed(key.seed) ^ key.frame));
+  return mixed(frame_stream(key));
 }
 
 }  // namespace hpr

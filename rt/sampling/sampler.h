@@ -78,6 +78,9 @@ struct SampleNumber {
   bool operator==(const SampleNumber&) const = default;
 };
 
+/// What the streams of a frame's pixels are made from.
+[[nodiscard]] std::uint64_t frame_stream(const RandomKey& key);
+
 /// The stream of a pixel: x and y count from the upper left corner of its whole screen, so that neither tiles, nor
 /// blocks, nor ranks change it.
 [[nodiscard]] std::uint64_t pixel_stream(const RandomKey& key, std::uint32_t screen, int x, int y);

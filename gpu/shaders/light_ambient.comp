@@ -1,0 +1,54 @@
+// The ambient-occlusion pass: even light from all sides that surfaces near by keep out.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "threads.glsl"
+
+#include "reals.glsl"
+#include "sampling.glsl"
+#include "sampler.glsl"
+#include "scene.glsl"
+#include "surface_point.glsl"
+#include "surfaces.glsl"
+#include "view.glsl"
+#include "textures.glsl"
+#include "materials.glsl"
+#include "media.glsl"
+#include "microfacets.glsl"
+#include "plain_bsdf.glsl"
+#include "bsdf.glsl"
+#include "path.glsl"
+#include "trace.glsl"
+#include "light_state.glsl"
+
+uint occlusion_rays = 0u;
+
+// AmbientOcclusionPass.
+dvec3 ambient_light(PathVertex point) {
+  dvec3 sum = dvec3(0.0lf);
+  uint count = work.occlusion_rays;
+  if (count == 0u || bsdf_weight(point.bsdf, kDiffuse) == dvec3(0.0lf)) return sum;
+  Sampler random = branch_of(point.random, 16u);
+  for (uint i = 0u; i < count; ++i) {
+    BsdfSample way;
+    if (!bsdf_sample(point.bsdf, kDiffuse, next_two(random, 1u), way)) continue;
+    TracedRay ray = TracedRay(ray_origin(point.surface, way.direction) + point.surface.lift, way.direction,
+                              work.occlusion_reach, true);
+    ++occlusion_rays;
+    if (is_blocked(work.scene.tree, ray)) continue;
+    sum += point.throughput * way.weight * (point.material.occlusion * work.ambient / double(count));
+  }
+  return sum;
+}
+
+void shade() {
+  if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
+  work.states.states[pixel_index].sum += ambient_light(work.states.states[pixel_index].vertex);
+  note_cut_off(false);
+}
+
+void main() {
+  start_counts();
+  shade();
+  atomicAdd(group_counts[kOcclusionRays], occlusion_rays);
+  add_counts();
+}

@@ -1,0 +1,26 @@
+// The light of each pixel, once all is added up.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "threads.glsl"
+
+#include "reals.glsl"
+#include "sampling.glsl"
+#include "sampler.glsl"
+#include "scene.glsl"
+#include "surface_point.glsl"
+#include "surfaces.glsl"
+#include "view.glsl"
+#include "textures.glsl"
+#include "materials.glsl"
+#include "media.glsl"
+#include "microfacets.glsl"
+#include "plain_bsdf.glsl"
+#include "bsdf.glsl"
+#include "path.glsl"
+#include "light_state.glsl"
+
+void main() {
+  if (!start_pixel()) return;
+  PixelState state = work.states.states[pixel_index];
+  work.pixels.pixels[pixel_index] = vec4(state.sum, state.is_cut_off != 0u ? kUnfinished : float(state.covered));
+}

@@ -1,0 +1,61 @@
+// The first vertex of each pixel's path: the surface that its key names. Where there is none, what lies past all surfaces.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "threads.glsl"
+
+#include "reals.glsl"
+#include "sampling.glsl"
+#include "sampler.glsl"
+#include "scene.glsl"
+#include "surface_point.glsl"
+#include "surfaces.glsl"
+#include "view.glsl"
+#include "textures.glsl"
+#include "materials.glsl"
+#include "media.glsl"
+#include "microfacets.glsl"
+#include "plain_bsdf.glsl"
+#include "bsdf.glsl"
+#include "path.glsl"
+#include "light_state.glsl"
+#include "discrete.glsl"
+#include "environment.glsl"
+#include "light_tree.glsl"
+#include "punctual_lights.glsl"
+#include "triangle_lights.glsl"
+#include "lights.glsl"
+
+void main() {
+  if (!start_pixel()) return;
+  LitTile tile = tile_of_pixel();
+  uvec2 place = place_in_tile();
+  work.states.states[pixel_index].sum = dvec3(0.0lf);
+  work.states.states[pixel_index].waiting = 0u;
+  work.states.states[pixel_index].is_cut_off = 0u;
+  work.states.states[pixel_index].covered = 0u;
+  if (place.x >= tile.size.x || place.y >= tile.size.y) return;
+  View view = work.views.views[tile.view];
+  uvec2 at = uvec2(tile.corner) + place;
+  Ray ray = view_ray(view, at);
+  uint64_t key = work.keys.keys[pixel_index];
+  if (key == 0ul) {
+    Lights lights = Lights(work.lights);
+    work.states.states[pixel_index].sum =
+        work.shows_environment != 0u ? environment_radiance(lights, normalize(ray.direction)) : work.background;
+    return;
+  }
+  FoundVertex first;
+  first.origin = ray.origin;
+  first.direction = ray.direction;
+  first.throughput = dvec3(1.0lf);
+  first.media = work.eye_media.media[tile.view];
+  first.previous_position = view.eye;
+  first.previous_normal = dvec3(0.0lf);
+  first.previous_pdf = 0.0lf;
+  first.random = make_sampler(pixel_stream(work.random_frame, view.screen_number, view.block + ivec2(at)), work.sample_index);
+  first.surface = ~uint(key);
+  first.depth = 0u;
+  work.waiting.found[pixel_index * kMaxWaiting] = first;
+  work.states.states[pixel_index].waiting = 1u;
+  work.states.states[pixel_index].covered = 1u;
+}

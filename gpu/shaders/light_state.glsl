@@ -1,0 +1,135 @@
+// What the kernels that light tiles have in common: their input, and what they keep of every pixel between them. A pixel's path
+// is a tree: one vertex after the other is shaded, those that its rays reached wait on a stack of the pixel's own. So every
+// pixel's light is added up in one order, whatever is lit beside it.
+// Needs all that makes points of surfaces, materials, BSDFs and views, and path.glsl.
+
+struct LitTile {
+  ivec2 corner;  // on the view's block
+  uvec2 size;
+  uint view;
+  uint padding;
+};
+layout(buffer_reference, scalar) readonly buffer LitTiles {
+  LitTile tiles[];
+};
+layout(buffer_reference, scalar) readonly buffer Keys {
+  uint64_t keys[];
+};
+layout(buffer_reference, scalar) writeonly buffer LitPixels {
+  vec4 pixels[];  // radiance, and the share that surfaces cover
+};
+layout(buffer_reference, scalar) readonly buffer ViewList {
+  View views[];
+};
+layout(buffer_reference, scalar) readonly buffer MediaList {
+  Media media[];
+};
+layout(buffer_reference, scalar) buffer Counters {
+  uint counts[];
+};
+
+// Of a pixel.
+struct PixelState {
+  dvec3 sum;
+  uint waiting;     // vertices on its stack
+  uint is_shading;  // whether `vertex` is one that it had
+  uint is_cut_off;  // a device ended a loop, or more waited than there is room for
+  uint covered;
+  PathVertex vertex;
+};
+layout(buffer_reference, scalar) buffer PixelStates {
+  PixelState states[];
+};
+layout(buffer_reference, scalar) buffer WaitingVertices {
+  FoundVertex found[];
+};
+// Two surfaces that a path begins with may split into all lobes and channels, what comes after does not.
+const uint kMaxWaiting = 12u;
+
+struct LightInput {
+  SceneTrees scene;
+  SurfaceTables surfaces;
+  Materials materials;
+  uint64_t lights;
+  uint64_t photons;  // null: none
+  LitTiles tiles;
+  Keys keys;
+  LitPixels pixels;
+  PixelStates states;
+  WaitingVertices waiting;
+  ViewList views;
+  MediaList eye_media;  // of each view
+  Counters counters;
+  uint64_t random_frame;
+  dvec3 background;
+  double ambient;
+  double occlusion_reach;
+  PathLimits limits;
+  uint shows_environment;  // past all surfaces, in place of `background`
+  uint sample_index;
+  uint light_samples;
+  uint occlusion_rays;
+  uint shadows;
+  uint terminator_fix;
+};
+layout(buffer_reference, scalar) readonly buffer LightInputs {
+  LightInput light;
+};
+layout(push_constant, scalar) uniform Constants {
+  LightInputs inputs;
+  uint tile_count;
+  uint padding;
+};
+
+const uint kTilePixels = 4096u;
+const uint kTileSide = 64u;
+const float kUnfinished = -1.0;  // no pixel covers so little
+
+// As they are counted.
+const uint kShadowRays = 0u;
+const uint kReflectionRays = 1u;
+const uint kRefractionRays = 2u;
+const uint kOcclusionRays = 3u;
+const uint kWaitingPixels = 4u;  // that are not done
+const uint kCounters = 5u;
+
+LightInput work;
+uint pixel_index;  // among all that are lit together
+
+// Whether this thread has a pixel; sets what is known of it.
+bool start_pixel() {
+  pixel_index = uint(thread_index());
+  if (pixel_index >= tile_count * kTilePixels) return false;
+  work = inputs.light;
+  return true;
+}
+
+LitTile tile_of_pixel() {
+  return work.tiles.tiles[pixel_index / kTilePixels];
+}
+
+uvec2 place_in_tile() {
+  return uvec2(pixel_index % kTileSide, pixel_index / kTileSide % kTileSide);
+}
+
+// Software devices end all loops of a thread after some turns, in silence.
+void note_cut_off(bool is_cut_off) {
+  uint turns = 0u;
+  uint wanted = min(tile_count, 2u);
+  while (turns < wanted) ++turns;
+  if (is_cut_off || turns < wanted) work.states.states[pixel_index].is_cut_off = 1u;
+}
+
+shared uint group_counts[kCounters];
+
+void start_counts() {
+  if (gl_LocalInvocationIndex < kCounters) group_counts[gl_LocalInvocationIndex] = 0u;
+  barrier();
+}
+
+void add_counts() {
+  barrier();
+  if (gl_LocalInvocationIndex < kCounters && group_counts[gl_LocalInvocationIndex] > 0u) {
+    atomicAdd(inputs.light.counters.counts[gl_LocalInvocationIndex], group_counts[gl_LocalInvocationIndex]);
+  }
+}

@@ -1,0 +1,43 @@
+#include "rt/light_device.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/timing.h"
+#include "rt/passes/path_vertex.h"
+#include "rt/passes/pixel_sums.h"
+
+namespace hpr {
+namespace {
+
+/// Whether only light is stored, and no layer of what it is made of.
+bool wants_light_alone(const LightOutput& output) {
+  return std::ranges::all_of(output.components, [](const auto* layer) { return layer == nullptr; }) &&
+         output.normal == nullptr && output.albedo == nullptr && output.cost == nullptr;
+}
+
+}  // namespace
+
+std::vector<std::size_t> light_on_device(LightDevice* device, const DeviceTiles& lit, RayCounts& traced) {
+  if (device == nullptr || !wants_light_alone(lit.samples.front().output)) return {lit.tiles.begin(), lit.tiles.end()};
+  const trace::Span span("light, on the device");
+  std::set<std::size_t> unfinished;
+  device->shade(lit, traced, [&](const ShadedSample& sample, std::size_t tile, std::span<const glm::vec4> pixels) {
+    set_active(sample.output, tile);
+    if (pixels.empty()) {
+      unfinished.insert(tile);
+      return;
+    }
+    const TilePlace place = sample.keys->layout().place(tile);
+    const TileJob job{place.pixels,
+                      sample.number,
+                      sample.keys->tile(tile),
+                      &sample.views[place.screen],
+                      0,
+                      mask_of(sample.wanted, tile)};
+    store_lit(job, tile, pixels, sample.output, traced);
+  });
+  return {unfinished.begin(), unfinished.end()};
+}
+
+}  // namespace hpr
