@@ -1,25 +1,21 @@
 // How a surface scatters light at one place: Bsdf of rt/materials/bsdf.h.
-// Needs plain_bsdf.glsl and what that needs.
-
-struct Bsdf {
-  PlainBsdf plain;
-  bool is_extended;
-};
+// Needs extended_bsdf.glsl and what that needs.
 
 Bsdf make_bsdf(MaterialPoint material, SurfacePoint surface, bool flux) {
-  return Bsdf(make_plain_bsdf(material, surface, flux), false);
+  return make_extended_bsdf(material, surface, flux);
 }
 
 bool bsdf_present(Bsdf b, uint lobe) {
-  return plain_present(b.plain, lobe);
+  return b.extended ? extended_present(b, lobe) : plain_present(b.plain, lobe);
 }
 
 bool bsdf_is_delta(Bsdf b, uint lobe) {
-  return plain_is_delta(b.plain, lobe);
+  return b.extended ? extended_is_delta(b, lobe) : plain_is_delta(b.plain, lobe);
 }
 
 // f of one lobe, 1/sr, and the density of sampling that direction.
 dvec3 bsdf_lobe(Bsdf b, uint lobe, dvec3 to_light, out double pdf) {
+  if (b.extended) return extended_lobe(b, lobe, to_light, pdf);
   return plain_lobe(b.plain, lobe, to_light, pdf);
 }
 
@@ -34,37 +30,61 @@ double bsdf_pdf(Bsdf b, uint lobe, dvec3 to_light) {
   return pdf;
 }
 
+// f and density of every lobe.
 Scattering bsdf_scattering(Bsdf b, dvec3 to_light) {
-  return plain_scattering(b.plain, to_light);
+  if (!b.extended) return plain_scattering(b.plain, to_light);
+  Scattering all;
+  for (uint i = 0u; i < kLobes; ++i) {
+    double pdf;
+    all.value[i] = extended_lobe(b, i, to_light, pdf);
+    all.pdf[i] = pdf;
+  }
+  return all;
+}
+
+// The sum of f over the lobes whose bits `lobes` has.
+dvec3 bsdf_sum(Bsdf b, uint lobes, dvec3 to_light) {
+  dvec3 sum = dvec3(0.0lf);
+  if (!b.extended) {
+    Scattering all = plain_scattering(b.plain, to_light);
+    for (uint i = 0u; i < kCoat; ++i) sum += ((lobes >> i) & 1u) != 0u ? all.value[i] : dvec3(0.0lf);
+    return sum;
+  }
+  for (uint i = 0u; i < kLobes; ++i) {
+    double pdf;
+    if (((lobes >> i) & 1u) != 0u) sum += extended_lobe(b, i, to_light, pdf);
+  }
+  return sum;
 }
 
 // The sum over Diffuse and Reflection, a coat among that, or one of them.
 dvec3 bsdf_reflected(Bsdf b, dvec3 to_light, bool diffuse, bool specular) {
-  return plain_reflected(b.plain, to_light, diffuse, specular);
+  return bsdf_sum(b, (diffuse ? 1u << kDiffuse : 0u) | (specular ? (1u << kReflection) | (1u << kCoat) : 0u), to_light);
 }
 
 // f of all lobes.
 dvec3 bsdf_total(Bsdf b, dvec3 to_light) {
-  double pdf;
-  return plain_reflected(b.plain, to_light, true, true) + scatter_through(b.plain, to_light, pdf);
+  return bsdf_sum(b, (1u << kLobes) - 1u, to_light);
 }
 
 // False when the lobe is absent or the sample fails.
 bool bsdf_sample(Bsdf b, uint lobe, dvec2 u, out BsdfSample s) {
+  if (b.extended) return extended_sample(b, lobe, u, s);
   return plain_sample(b.plain, lobe, u, s);
 }
 
 dvec3 bsdf_weight(Bsdf b, uint lobe) {
-  return plain_weight(b.plain, lobe);
+  return b.extended ? extended_weight(b, lobe) : plain_weight(b.plain, lobe);
 }
 
 double bsdf_roughness(Bsdf b, uint lobe) {
-  return b.plain.roughness;
+  return b.extended && lobe == kCoat ? b.extensions.clearcoat_roughness : b.plain.roughness;
 }
 
 // The normal that lights are chosen by: zero where they may shine through.
 dvec3 bsdf_light_normal(Bsdf b) {
-  return bsdf_present(b, kTransmission) ? dvec3(0.0lf) : b.plain.normal;
+  bool shines = bsdf_present(b, kTransmission) || bsdf_present(b, kDiffuseTransmission);
+  return shines ? dvec3(0.0lf) : b.plain.normal;
 }
 
 // Whether light is followed along the lobe rather than gathered from photons.

@@ -10,6 +10,10 @@
 #include "materials.glsl"
 #include "microfacets.glsl"
 #include "plain_bsdf.glsl"
+#include "sheen.glsl"
+#include "thin_film.glsl"
+#include "anisotropic_facets.glsl"
+#include "extended_bsdf.glsl"
 #include "bsdf.glsl"
 #include "test_surfaces.glsl"
 
@@ -21,15 +25,15 @@ struct BsdfUse {
   double glossy_cutoff;
   uint lobe;
   uint flux;
+  uint summed;
+  uint padding;
 };
 struct FoundBsdf {
   dvec3 values[5];
   double pdfs[5];
   dvec3 value;
   double pdf;
-  dvec3 diffuse;
-  dvec3 specular;
-  dvec3 total;
+  dvec3 sum;
   dvec3 weight;
   dvec3 light_normal;
   double roughness;
@@ -63,11 +67,10 @@ void main() {
   FoundBsdf each;
   each.values = scattering.value;
   each.pdfs = scattering.pdf;
-  each.value = bsdf_value(b, use.lobe, use.to_light);
-  each.pdf = bsdf_pdf(b, use.lobe, use.to_light);
-  each.diffuse = bsdf_reflected(b, use.to_light, true, false);
-  each.specular = bsdf_reflected(b, use.to_light, false, true);
-  each.total = bsdf_total(b, use.to_light);
+  each.value = scattering.value[use.lobe];
+  each.pdf = scattering.pdf[use.lobe];
+  if (!b.extended) each.value = plain_lobe(b.plain, use.lobe, use.to_light, each.pdf);  // else what was summed up
+  each.sum = bsdf_sum(b, use.summed, use.to_light);
   each.weight = bsdf_weight(b, use.lobe);
   each.light_normal = bsdf_light_normal(b);
   each.roughness = bsdf_roughness(b, use.lobe);
