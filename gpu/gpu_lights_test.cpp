@@ -2,6 +2,7 @@
 
 #include <hpr/shaders/environment_samples.h>
 #include <hpr/shaders/light_samples.h>
+#include <hpr/shaders/photon_starts.h>
 #include <hpr/shaders/punctual_samples.h>
 #include <hpr/shaders/tree_choices.h>
 #include <hpr/shaders/triangle_samples.h>
@@ -417,6 +418,7 @@ std::vector<LightScene> light_scenes(Random& random) {
   all[5].scene = test::with_triangles(random, 50, 2);
   const std::vector<Environment> skies = test::environments();
   all[1].scene.environment = skies[5];
+  all[1].scene.environment->scale = 1e-5;  // less than triangles give to what is near
   all[2].scene.environment = skies[4];
   all[3].scene.environment = skies[0];
   all[4].scene.environment = skies[0];
@@ -515,6 +517,77 @@ TEST_F(GpuLightsTest, CoatedTrianglesAreReported) {
   finish_scene(scene);
   const GpuMaterials materials(device(), scene);
   EXPECT_TRUE(GpuLights(device(), scene, LightSampler(scene), materials).has_coated());
+}
+
+/// As photon_starts.comp has them.
+struct PhotonQuery {
+  double choice;
+  glm::dvec2 u_place;
+  glm::dvec2 u_direction;
+};
+struct PhotonAnswer {
+  glm::dvec3 origin;
+  glm::dvec3 direction;
+  glm::dvec3 flux;
+  double offset;
+  glm::dvec3 center;
+  double range;
+  Media media;
+  std::uint32_t surface;
+  std::uint32_t endless;
+  std::uint32_t emitted;
+  std::uint32_t padding;
+};
+
+/// A solid that absorbs about all lights.
+void add_solid(Scene& scene) {
+  Material glass = test::clear_glass(1.0F, 1.0F);
+  glass.attenuation_distance = 10.0F;
+  glass.attenuation_color = {0.5F, 0.25F, 0.75F};
+  test::place_mesh(scene, test::add_mesh(scene, test::sphere(60.0, 8, test::add_material(scene, glass))));
+  finish_scene(scene);
+}
+
+TEST_F(GpuLightsTest, PhotonsStartAsOnTheCpu) {
+  Random random(16);
+  std::vector<LightScene> all = light_scenes(random);
+  add_solid(all[2].scene);
+  add_solid(all[5].scene);
+  for (std::size_t number = 0; number < all.size(); ++number) {
+    const Scene& scene = all[number].scene;
+    const LightSampler sampler(scene, all[number].constant);
+    const GpuMaterials materials(device(), scene);
+    const GpuLights lights(device(), scene, sampler, materials);
+    std::vector<PhotonQuery> queries(kInputs / all.size());
+    for (PhotonQuery& query : queries) query = {random.number(), random.two(), random.two()};
+    const auto found = test::map_on_gpu<PhotonAnswer>(device(), photon_starts, std::span<const PhotonQuery>(queries),
+                                                      lights.address());
+    Errors errors;
+    std::size_t emitted = 0;
+    std::size_t in_media = 0;
+    const double size = sampler.lit_sphere().radius;
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+      const auto expected = sampler.emit(queries[i].choice, queries[i].u_place, queries[i].u_direction);
+      ASSERT_EQ(found[i].emitted != 0, expected.has_value()) << i;
+      if (!expected) continue;
+      ++emitted;
+      errors.add(found[i].origin, expected->origin, size);
+      errors.add(found[i].direction, expected->direction);
+      errors.add(found[i].flux, expected->flux, 1e-6);
+      errors.add(found[i].offset, expected->offset);
+      errors.add(found[i].center, expected->center);
+      errors.add(found[i].range, expected->range);
+      ASSERT_EQ(found[i].media, expected->media) << i;
+      ASSERT_EQ(found[i].surface, expected->surface) << i;
+      ASSERT_EQ(found[i].endless != 0, expected->endless) << i;
+      if (expected->media != Media{}) ++in_media;
+    }
+    EXPECT_EQ(errors.large(), 0U) << errors.largest() << ", scene " << number;
+    EXPECT_EQ(emitted, number == 0 ? 0 : queries.size());
+    if (number == 5) {
+      EXPECT_EQ(in_media, queries.size());
+    }
+  }
 }
 
 }  // namespace
