@@ -258,12 +258,19 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
 
 std::string advice_on(const Image<Rgba8>& picture) {
   constexpr double kTooMuch = 0.9;
-  const auto covered = std::ranges::count_if(picture.pixels(), [](const Rgba8& color) { return color.a > 0; });
   const auto share_of = [&](const auto& is) {
-    const auto count = std::ranges::count_if(
-        picture.pixels(), [&](const Rgba8& color) { return (covered == 0 || color.a > 0) && is(color); });
-    return static_cast<double>(count) /
-           (covered == 0 ? static_cast<double>(picture.size().area()) : static_cast<double>(covered));
+    // Once more than a tenth of all is otherwise, no more need be counted.
+    const std::size_t most_others = picture.size().area() / 10;
+    std::size_t there = 0;
+    std::size_t others = 0;
+    for (const Rgba8& color : picture.pixels()) {
+      if (color.a == 0) continue;
+      ++there;
+      if (!is(color) && ++others > most_others) return 0.0;
+    }
+    if (there > 0) return static_cast<double>(there - others) / static_cast<double>(there);
+    return static_cast<double>(std::ranges::count_if(picture.pixels(), is)) /
+           static_cast<double>(picture.size().area());
   };
   const auto brightest = [](const Rgba8& color) { return std::max({color.r, color.g, color.b}); };
   const double black = share_of([&](const Rgba8& color) { return brightest(color) <= 1; });

@@ -296,8 +296,7 @@ void Denoiser::add_sample(const LightContext& context, const TileJob& job, RayBu
   const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.hits[ray]);
   const SurfacePoint surface = context.surfaces.meet(triangle, request.origin, request.direction);
   if (add_filtered(context, job, sample, feature_at(surface, job.view->eye))) return;
-  PathVertex& point = unfiltered.emplace_back();
-  point.surface = surface;
+  PathVertex& point = unfiltered.emplace_back(surface);
   start_vertex(context, job, static_cast<int>(sample.pixel) % kTileSide, static_cast<int>(sample.pixel) / kTileSide,
                sample.fraction, point);
   point.sampler = point.sampler.branch(kSubpixelBranch + sample.number);

@@ -91,11 +91,12 @@ glm::dvec3 DirectLight::shared_scattering(const PathVertex& point, const LightSa
   glm::dvec3 scattered(0.0);
   const Scattering all = point.bsdf.scattering(light.to_light);
   const bool leaves_caustics = context_.leaves_caustics(point);
-  for (std::size_t lobe = 0; lobe < point.bsdf.lobes().size(); ++lobe) {
+  const bool may_be_found = light.pdf > 0.0 && (!point.gathers_near() || light.distance < point.gather_reach);
+  const std::size_t lobes = point.bsdf.lobes().size();
+  for (std::size_t lobe = 0; lobe < lobes; ++lobe) {
     if (leaves_caustics && context_.follows_for_itself(point.bsdf, kLobes[lobe])) continue;
-    const bool is_weighed =
-        point.may_follow[lobe] && light.pdf > 0.0 && (!point.gathers_near() || light.distance < point.gather_reach);
-    const double weight = is_weighed ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
+    const double weight =
+        may_be_found && point.may_follow[lobe] ? 1.0 - balance_heuristic(context_, all.pdf[lobe], light.pdf) : 1.0;
     scattered += weight * all.value[lobe];
   }
   return scattered;

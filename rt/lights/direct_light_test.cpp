@@ -32,8 +32,7 @@ class LitFloor {
     surfaces.load(0, triangle);
     for (std::uint32_t pixel = 0; pixel < kTilePixels; ++pixel) {
       const Ray ray = view_ray(view, pixel % kTileSide + 0.5, static_cast<int>(pixel) / kTileSide + 0.5);
-      PathVertex& point = wave.vertices.emplace_back();
-      point.surface = surfaces.meet(triangle, ray.origin, ray.direction);
+      PathVertex& point = wave.vertices.emplace_back(surfaces, triangle, ray.origin, ray.direction);
       point.pixel = pixel;
       point.sampler = Sampler(pixel, 0);
       finish_vertex(*context, point);

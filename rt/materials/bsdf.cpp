@@ -37,7 +37,9 @@ double largest(const glm::dvec3& v) {
 }  // namespace
 
 Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried carried)
-    : geometric_normal_(surface.geometric_normal),
+    : view_(surface.to_viewer),
+      normal_(material.normal),
+      geometric_normal_(surface.geometric_normal),
       base_color_(material.base_color),
       roughness_(material.roughness),
       alpha2_(square(square(material.roughness))),
@@ -59,7 +61,7 @@ Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried c
       tint_ = chosen;
     }
   }
-  look(surface.to_viewer, material.normal);
+  look();
   if (material.extensions) {
     extended_ = std::make_shared<const ExtendedBsdf>(material, surface, carried);
   } else if (disperses(material) && shares_directions(material)) {
@@ -71,6 +73,7 @@ Bsdf::Bsdf(const MaterialPoint& material, const SurfacePoint& surface, Carried c
     }
     channels_ = std::make_shared<const std::array<Bsdf, 3>>(channels);
   }
+  find_lobes();
 }
 
 bool Bsdf::shares_directions(const MaterialPoint& material) {
@@ -78,10 +81,8 @@ bool Bsdf::shares_directions(const MaterialPoint& material) {
          square(material.roughness) * (1.0 - 1.0 / std::max(material.ior - material.ior_spread, 1.0)) >= kNarrowest;
 }
 
-/// Sets all that depends on the viewer.
-void Bsdf::look(const glm::dvec3& to_viewer, const glm::dvec3& normal) {
-  view_ = to_viewer;
-  normal_ = normal;
+/// Sets what depends on the viewer, but for the lobes.
+void Bsdf::look() {
   normal_view_ = glm::dot(normal_, view_);
   scatters_ = !unlit_ && normal_view_ > kEdgeOn && glm::dot(geometric_normal_, view_) > 0.0;
   normal_view_ = std::min(normal_view_, 1.0);
@@ -91,23 +92,49 @@ void Bsdf::look(const glm::dvec3& to_viewer, const glm::dvec3& normal) {
   view_enters_ = (1.0 - dielectric_fresnel(normal_view_)) / entering(std::max(eta_, 1.0 / eta_));
 }
 
+/// Sets present_ and delta_ by all other members.
+void Bsdf::find_lobes() {
+  present_ = delta_ = 0;
+  if (extended_) {
+    for (const Lobe lobe : kLobes) {
+      if (extended_->present(lobe)) present_ |= set_of(lobe);
+      if (extended_->is_delta(lobe)) delta_ |= set_of(lobe);
+    }
+    return;
+  }
+  if (roughness_ < kDeltaRoughness) {
+    delta_ = set_of(Lobe::Reflection) | set_of(Lobe::Transmission);
+  } else if (solid_ && square(roughness_) * std::abs(eta_ - 1.0) < kNarrowest) {
+    delta_ = set_of(Lobe::Transmission);
+  }
+  if (!scatters_) return;
+  if (reflects_ || metallic_ > 0.0) present_ |= set_of(Lobe::Reflection);
+  if (largest(tint_) > 0.0) present_ |= set_of(Lobe::Transmission);
+  if (!all_mirror_ && diffuse_ * largest(base_color_) > 0.0 && (!exact_ || view_enters_ > 0.0)) {
+    present_ |= set_of(Lobe::Diffuse);
+  }
+}
+
 Bsdf Bsdf::seen_from(const glm::dvec3& to_viewer, const glm::dvec3& normal) const {
   Bsdf other = *this;
-  other.look(to_viewer, normal);
+  other.view_ = to_viewer;
+  other.normal_ = normal;
+  other.look();
   if (extended_) other.extended_ = std::make_shared<const ExtendedBsdf>(extended_->seen_from(to_viewer, normal));
   if (channels_) {
     std::array<Bsdf, 3> channels;
     std::ranges::transform(*channels_, channels.begin(), [&](const Bsdf& b) { return b.seen_from(to_viewer, normal); });
     other.channels_ = std::make_shared<const std::array<Bsdf, 3>>(channels);
   }
+  other.find_lobes();
   return other;
 }
 
-bool Bsdf::same_side(const glm::dvec3& to_light) const {
+inline bool Bsdf::same_side(const glm::dvec3& to_light) const {
   return glm::dot(normal_, to_light) > kEdgeOn && glm::dot(geometric_normal_, to_light) > 0.0;
 }
 
-bool Bsdf::other_side(const glm::dvec3& to_light) const {
+inline bool Bsdf::other_side(const glm::dvec3& to_light) const {
   return glm::dot(normal_, to_light) < -kEdgeOn && glm::dot(geometric_normal_, to_light) < 0.0;
 }
 
@@ -120,7 +147,7 @@ double Bsdf::dielectric_fresnel(double cosine) const {
   return f0_ + (1.0 - f0_) * (square(square(m)) * m);
 }
 
-glm::dvec3 Bsdf::fresnel(double cosine, double dielectric) const {
+inline glm::dvec3 Bsdf::fresnel(double cosine, double dielectric) const {
   glm::dvec3 result((1.0 - metallic_) * dielectric);
   if (metallic_ > 0.0) {
     const double m = 1.0 - std::clamp(cosine, 0.0, 1.0);
@@ -130,10 +157,9 @@ glm::dvec3 Bsdf::fresnel(double cosine, double dielectric) const {
   return result;
 }
 
-/// Each channel by its own index where they differ: near the critical angle one is let through that another is not.
-glm::dvec3 Bsdf::fresnel_of_facets(double cosine, double dielectric) const {
+/// Each channel by its own index: near the critical angle one is let through that another is not.
+glm::dvec3 Bsdf::fresnel_by_channel(double cosine, double dielectric) const {
   glm::dvec3 result = fresnel(cosine, dielectric);
-  if (!channels_) return result;
   for (int c = 0; c < 3; ++c) {
     const double own = (*channels_)[static_cast<std::size_t>(c)].dielectric_fresnel(cosine);
     result[c] += (1.0 - metallic_) * (own - dielectric);
@@ -141,7 +167,11 @@ glm::dvec3 Bsdf::fresnel_of_facets(double cosine, double dielectric) const {
   return result;
 }
 
-double Bsdf::distribution(const glm::dvec3& half) const {
+inline glm::dvec3 Bsdf::fresnel_of_facets(double cosine, double dielectric) const {
+  return channels_ ? fresnel_by_channel(cosine, dielectric) : fresnel(cosine, dielectric);
+}
+
+inline double Bsdf::distribution(const glm::dvec3& half) const {
   // (n.h)^2 (alpha^2 - 1) + 1 without the cancellation that costs all digits of a narrow lobe.
   const glm::dvec3 across = glm::cross(normal_, half);
   const double spread = glm::dot(across, across) + alpha2_ * square(glm::dot(normal_, half));
@@ -149,7 +179,7 @@ double Bsdf::distribution(const glm::dvec3& half) const {
 }
 
 /// Heitz 2014, equation 99, over 4 |n.v| |n.l|.
-double Bsdf::shadowing(double normal_light) const {
+inline double Bsdf::shadowing(double normal_light) const {
   const double light_smith = std::sqrt(alpha2_ + (1.0 - alpha2_) * square(normal_light));
   return 0.5 / (normal_light * view_smith_ + normal_view_ * light_smith);
 }
@@ -308,14 +338,6 @@ Scattering Bsdf::scattering(const glm::dvec3& to_light) const {
   return all;
 }
 
-bool Bsdf::present(Lobe lobe) const {
-  if (extended_) return extended_->present(lobe);
-  if (!scatters_ || is_extension(lobe)) return false;
-  if (lobe == Lobe::Reflection) return reflects_ || metallic_ > 0.0;
-  if (lobe == Lobe::Transmission) return largest(tint_) > 0.0;
-  return !all_mirror_ && diffuse_ * largest(base_color_) > 0.0 && (!exact_ || view_enters_ > 0.0);
-}
-
 /// The root mean square of what the facets that the viewer sees reflect, or let through: chances in proportion to it
 /// make samples vary least. At grazing angles and about the critical one the shares of facets are far from that of the
 /// surface's own normal.
@@ -352,13 +374,6 @@ glm::dvec3 Bsdf::weight(Lobe lobe) const {
     return (diffuse_ * std::max(1.0 - f0_, kMinWeight)) * base_color_;
   }
   return (single ? (1.0 - dielectric_fresnel(normal_view_)) * squeeze_ : facet_share(lobe)) * tint_;
-}
-
-bool Bsdf::is_delta(Lobe lobe) const {
-  if (extended_) return extended_->is_delta(lobe);
-  if (lobe == Lobe::Diffuse) return false;
-  if (roughness_ < kDeltaRoughness) return true;
-  return lobe == Lobe::Transmission && solid_ && square(roughness_) * std::abs(eta_ - 1.0) < kNarrowest;
 }
 
 /// The viewer's direction refracted at facets of `normal`; none where all is reflected.
@@ -441,8 +456,8 @@ std::optional<BsdfSample> Bsdf::sample_channels(const glm::dvec2& u) const {
   return sample;
 }
 
-double Bsdf::roughness(Lobe lobe) const {
-  return extended_ ? extended_->roughness(lobe) : roughness_;
+double Bsdf::coat_roughness() const {
+  return extended_->coat_roughness();
 }
 
 std::optional<BsdfSample> Bsdf::sample(Lobe lobe, const glm::dvec2& u) const {

@@ -24,6 +24,13 @@ enum class Lobe : std::uint8_t {
 inline constexpr std::array<Lobe, 5> kLobes{Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat,
                                             Lobe::DiffuseTransmission};
 
+/// Some lobes: one bit each.
+using LobeSet = std::uint8_t;
+
+[[nodiscard]] constexpr LobeSet set_of(Lobe lobe) {
+  return static_cast<LobeSet>(1U << static_cast<unsigned>(lobe));
+}
+
 /// Whether only surfaces with extensions have the lobe.
 [[nodiscard]] constexpr bool is_extension(Lobe lobe) {
   return lobe == Lobe::Coat || lobe == Lobe::DiffuseTransmission;
@@ -115,20 +122,21 @@ class Bsdf {
   /// 2023).
   [[nodiscard]] std::optional<BsdfSample> sample(Lobe lobe, const glm::dvec2& u) const;
   /// Whether the surface has the lobe at all.
-  [[nodiscard]] bool present(Lobe lobe) const;
+  [[nodiscard]] bool present(Lobe lobe) const { return (present_ & set_of(lobe)) != 0; }
   /// The normal that lights are chosen by: zero where they may shine through.
   [[nodiscard]] glm::dvec3 light_normal() const {
-    if (extended_ && present(Lobe::DiffuseTransmission)) return glm::dvec3(0.0);
-    return present(Lobe::Transmission) ? glm::dvec3(0.0) : normal_;
+    return present(Lobe::Transmission) || present(Lobe::DiffuseTransmission) ? glm::dvec3(0.0) : normal_;
   }
   /// About the share of light that the lobe scatters towards the viewer: for choosing among lobes. Exact for lobes of
   /// one direction; for others never so low that a sample's weight, refraction's squeeze apart, is over 50 times as
   /// much. Zero exactly where the lobe is absent.
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
   /// Whether the lobe has a single direction: a perfect mirror, clear glass, rough glass of an index of almost 1.
-  [[nodiscard]] bool is_delta(Lobe lobe) const;
+  [[nodiscard]] bool is_delta(Lobe lobe) const { return (delta_ & set_of(lobe)) != 0; }
   /// Of the facets of a specular lobe.
-  [[nodiscard]] double roughness(Lobe lobe = Lobe::Reflection) const;
+  [[nodiscard]] double roughness(Lobe lobe = Lobe::Reflection) const {
+    return lobe == Lobe::Coat && extended_ ? coat_roughness() : roughness_;
+  }
   /// Whether the material has extensions that change it (see ExtendedBsdf).
   [[nodiscard]] bool is_extended() const { return extended_ != nullptr; }
   /// All lobes that the surface may have.
@@ -160,11 +168,14 @@ class Bsdf {
     double stretch = 1.0;       ///< |v + eta l|^2 for refraction
   };
 
-  void look(const glm::dvec3& to_viewer, const glm::dvec3& normal);
+  void look();
+  void find_lobes();
+  [[nodiscard]] double coat_roughness() const;
   [[nodiscard]] bool same_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool other_side(const glm::dvec3& to_light) const;
   [[nodiscard]] bool refracts() const { return solid_ && eta_ != 1.0; }
   [[nodiscard]] glm::dvec3 fresnel(double cosine, double dielectric) const;
+  [[nodiscard]] glm::dvec3 fresnel_by_channel(double cosine, double dielectric) const;
   [[nodiscard]] glm::dvec3 fresnel_of_facets(double cosine, double dielectric) const;
   [[nodiscard]] double below(const glm::dvec3& to_light, double dielectric) const;
   [[nodiscard]] double distribution(const glm::dvec3& half) const;
@@ -200,6 +211,8 @@ class Bsdf {
   bool all_mirror_ = false;  ///< an index of 0
   bool unlit_ = false;
   bool scatters_ = true;  ///< neither unlit nor seen edge-on
+  LobeSet present_ = 0;
+  LobeSet delta_ = 0;  ///< those that would have a single direction, present or not
   /// Each channel's alone, for its transmission, where they share directions; else null.
   std::shared_ptr<const std::array<Bsdf, 3>> channels_;
   std::shared_ptr<const ExtendedBsdf> extended_;  ///< stands for all of this where the material has extensions

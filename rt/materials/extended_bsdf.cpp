@@ -444,8 +444,4 @@ bool ExtendedBsdf::is_delta(Lobe lobe) const {
   return false;
 }
 
-double ExtendedBsdf::roughness(Lobe lobe) const {
-  return lobe == Lobe::Coat ? extensions_.clearcoat_roughness : material_.roughness;
-}
-
 }  // namespace hpr

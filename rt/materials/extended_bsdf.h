@@ -42,7 +42,7 @@ class ExtendedBsdf {
   [[nodiscard]] bool present(Lobe lobe) const;
   [[nodiscard]] glm::dvec3 weight(Lobe lobe) const;
   [[nodiscard]] bool is_delta(Lobe lobe) const;
-  [[nodiscard]] double roughness(Lobe lobe) const;
+  [[nodiscard]] double coat_roughness() const { return extensions_.clearcoat_roughness; }
 
  private:
   [[nodiscard]] double normal_to(const glm::dvec3& direction) const;

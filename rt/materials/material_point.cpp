@@ -162,6 +162,7 @@ void choose_channel(MaterialPoint& material, const glm::dvec3& throughput, doubl
 }
 
 void prefetch_material(const Scene& scene, const SurfacePoint& surface) {
+  if (scene.textures.empty()) return;
   const Material& material = scene.materials[surface.material];
   for (const TextureRef* const reference :
        {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture,

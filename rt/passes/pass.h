@@ -29,6 +29,12 @@ namespace hpr {
 /// A vertex of a path from the eye: a surface that a pixel shows, directly or after reflections and refractions (Veach
 /// 1997).
 struct PathVertex {
+  explicit PathVertex(const SurfacePoint& at) : surface(at) {}
+  /// Where a ray meets `triangle`.
+  PathVertex(const Surfaces& surfaces, const WorldTriangle& triangle, const glm::dvec3& origin,
+             const glm::dvec3& direction)
+      : surface(surfaces.meet(triangle, origin, direction)) {}
+
   SurfacePoint surface;
   MaterialPoint material;
   Bsdf bsdf;

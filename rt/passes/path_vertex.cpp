@@ -63,8 +63,7 @@ class PrimaryVertices {
   void find_surface(int x, int y, Key key, double fraction) {
     const Ray ray = ray_of(x, y);
     const WorldTriangle& triangle = buffers_.triangles.load(context_.surfaces, key_surface(key));
-    PathVertex& point = points_.emplace_back();
-    point.surface = context_.surfaces.meet(triangle, ray.origin, ray.direction);
+    PathVertex& point = points_.emplace_back(context_.surfaces, triangle, ray.origin, ray.direction);
     start_vertex(context_, job_, x, y, fraction, point);
   }
 
@@ -114,9 +113,7 @@ class PrimaryVertices {
           const double covered = left_[pixel] * coverage;
           const double fraction = covered * russian_roulette_weight(covered, sampler);
           if (fraction > 0.0) {
-            PathVertex& point = points_.emplace_back();
-            point.surface = surface;
-            start_vertex(context_, job_, x, y, fraction, point);
+            start_vertex(context_, job_, x, y, fraction, points_.emplace_back(surface));
           }
           left_[pixel] *= 1.0 - coverage;
           left_[pixel] *= russian_roulette_weight(left_[pixel], sampler);
@@ -332,14 +329,14 @@ void add_sky(const LightContext& context, const RayBuffers& buffers, std::size_t
   sums.add_shadowed(from.pixel, sky);
 }
 
-/// Sets the point that ray i reaches, but for what finish_vertex does.
-void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i, const PassInfo& pass,
-                 PathVertex& reached) {
+/// Adds the point that ray i reaches to `next`, but for what finish_vertex does.
+PathVertex& add_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i, const PassInfo& pass,
+                       std::vector<PathVertex>& next) {
   const LobeRay& ray = buffers.lobe_rays[i];
   const RayRequest& request = buffers.lobe_requests[i];
   const PathVertex& from = *ray.from;
   const WorldTriangle& triangle = buffers.triangles.load(context.surfaces, buffers.lobe_hits[i]);
-  reached.surface = context.surfaces.meet(triangle, request.origin, request.direction);
+  PathVertex& reached = next.emplace_back(context.surfaces, triangle, request.origin, request.direction);
   reached.throughput = ray.throughput;
   reached.media = media_towards(from.media, from.surface, from.material, request.direction);
   reached.previous_position = from.surface.position;
@@ -353,6 +350,7 @@ void make_vertex(const LightContext& context, RayBuffers& buffers, std::size_t i
   reached.gather_reach = gather_reach(context, from, reached);
   reached.is_caustic = is_caustic(context, from, pass);
   reached.component = component_after(from, pass.component);
+  return reached;
 }
 
 }  // namespace
@@ -485,11 +483,10 @@ void LobeRays::finish(const PassInfo& pass, std::vector<PathVertex>& next) {
   for (std::size_t i = first_of(finished_); i < ends_[finished_]; ++i) {
     add_sky(context_, buffers_, i, pass, sums_);
     if (buffers_.lobe_hits[i] == kNoSurface) continue;
-    make_vertex(context_, buffers_, i, pass, next.emplace_back());
-    const PathVertex& reached = next.back();
+    const PathVertex& reached = add_vertex(context_, buffers_, i, pass, next);
     if (reached.depth == 1 && !pass.gathers_all_lobes)
       sums_.note_distance(reached.pixel, glm::distance(reached.surface.position, reached.previous_position));
-    prefetch_material(context_.scene, next.back().surface);
+    prefetch_material(context_.scene, reached.surface);
   }
   ++finished_;
   // By now the memory has what materials read.

@@ -12,7 +12,7 @@ namespace {
 
 /// `count` pixels of `each` points.
 std::vector<PathVertex> points_of_pixels(std::size_t count, std::size_t each) {
-  std::vector<PathVertex> points(count * each);
+  std::vector<PathVertex> points(count * each, PathVertex(SurfacePoint{}));
   for (std::size_t i = 0; i < points.size(); ++i) points[i].pixel = static_cast<std::uint32_t>(i / each);
   return points;
 }

@@ -286,11 +286,6 @@ glm::dvec3 reflect_photons(const ReflectionTerms& terms, bool leans, const Photo
   return sum;
 }
 
-bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
-  if (lobe == Lobe::Transmission || lobe == Lobe::DiffuseTransmission) return true;
-  return lobe != Lobe::Diffuse && (bsdf.roughness(lobe) < glossy_cutoff || bsdf.is_delta(lobe));
-}
-
 bool follows_reflections(const Requirements& scene, double glossy_cutoff) {
   return scene.min_roughness < std::max(glossy_cutoff, Bsdf::kDeltaRoughness);
 }
@@ -301,7 +296,7 @@ bool may_take_photons(const Requirements& scene, double glossy_cutoff) {
 
 bool takes_photons(const Bsdf& bsdf, double glossy_cutoff) {
   return std::ranges::any_of(bsdf.lobes(),
-                             [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); });
+                             [&](Lobe lobe) { return bsdf.present(lobe) && !is_followed(bsdf, lobe, glossy_cutoff); });
 }
 
 namespace {
@@ -332,7 +327,7 @@ glm::dvec3 gather_photons(const PhotonMap& map, double radius, const SurfacePoin
                           const glm::dvec3& shading_normal, double glossy_cutoff, FoundPhotons& found) {
   if (map.size() == 0) return glm::dvec3(0.0);
   // Transmission is always followed, so photons count on the viewer's side alone.
-  const auto gathers = [&](Lobe lobe) { return !is_followed(bsdf, lobe, glossy_cutoff) && bsdf.present(lobe); };
+  const auto gathers = [&](Lobe lobe) { return bsdf.present(lobe) && !is_followed(bsdf, lobe, glossy_cutoff); };
   const bool diffuse = gathers(Lobe::Diffuse);
   const bool specular = gathers(Lobe::Reflection);
   const bool coat = gathers(Lobe::Coat);

@@ -19,7 +19,10 @@ namespace hpr {
 
 /// Whether the eye's paths follow this lobe: reflection of a roughness below `glossy_cutoff`, or in one direction only;
 /// transmission always, as what lies behind a surface is seldom what lights it.
-[[nodiscard]] bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff);
+[[nodiscard]] inline bool is_followed(const Bsdf& bsdf, Lobe lobe, double glossy_cutoff) {
+  if (lobe == Lobe::Transmission || lobe == Lobe::DiffuseTransmission) return true;
+  return lobe != Lobe::Diffuse && (bsdf.roughness(lobe) < glossy_cutoff || bsdf.is_delta(lobe));
+}
 
 /// Whether the eye's paths follow reflections of anything in the scene, judged by its least roughness.
 [[nodiscard]] bool follows_reflections(const Requirements& scene, double glossy_cutoff);
