@@ -272,15 +272,14 @@ std::string advice_on(const Image<Rgba8>& picture) {
     return static_cast<double>(std::ranges::count_if(picture.pixels(), is)) /
            static_cast<double>(picture.size().area());
   };
-  const auto brightest = [](const Rgba8& color) { return std::max({color.r, color.g, color.b}); };
-  const double black = share_of([&](const Rgba8& color) { return brightest(color) <= 1; });
+  const double black = share_of([&](const Rgba8& color) { return (color.r | color.g | color.b) <= 1; });
   if (black > kTooMuch) {
     return fmt::format(
         "{:.0f} % of the picture is black: --environment studio adds light, --exposure auto brightens, --eye and --at "
         "look elsewhere; --explain says what lights the scene",
         100.0 * black);
   }
-  const double clipped = share_of([&](const Rgba8& color) { return brightest(color) == 255; });
+  const double clipped = share_of([&](const Rgba8& color) { return std::max({color.r, color.g, color.b}) == 255; });
   if (clipped > kTooMuch) {
     return fmt::format(
         "{:.0f} % of the picture is clipped: --exposure auto or fewer stops darken it, --tone neutral "

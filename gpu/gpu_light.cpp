@@ -96,6 +96,10 @@ GpuPathLimits limits_of(const LightSources& sources) {
   return limits;
 }
 
+bool emits_through_coat(const Material& material) {
+  return material.extensions && material.extensions->clearcoat > 0.0F && material.emissive != glm::vec3(0.0F);
+}
+
 void grow_to(const GpuDevice& device, std::optional<GpuBuffer>& buffer, std::size_t bytes, GpuMemory memory) {
   if (buffer && buffer->bytes() >= bytes) return;
   buffer.reset();
@@ -112,9 +116,7 @@ std::string refusal_of_light(const Scene& scene, const RaySettings& settings, st
   if (settings.part) return "rays travel between ranks";
   if (runs_pass(plan, PassId::Gather)) return "gathering by rays is the CPU's";
   if (has_coverage(scene)) return "surfaces that cover in part are the CPU's";
-  if (std::ranges::any_of(scene.materials, [](const Material& material) { return material.extensions != nullptr; })) {
-    return "extensions of materials are the CPU's";
-  }
+  if (std::ranges::any_of(scene.materials, emits_through_coat)) return "emission through clear coats is the CPU's";
   return {};
 }
 

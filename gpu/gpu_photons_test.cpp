@@ -87,7 +87,7 @@ struct LitRoom : test::PhotonRoom {
 
 /// A place on a surface, as the CPU and as a device see it.
 struct Gather {
-  PathVertex vertex;
+  PathVertex vertex{SurfacePoint{}};
   std::uint32_t which = 0;
   double radius = 0.0;
   double glossy_cutoff = 0.0;

@@ -1,4 +1,4 @@
-// Needs bsdf.glsl, reflection_terms.glsl.
+// Photons at surfaces of all kinds. Needs bsdf.glsl, reflection_terms.glsl, photons.glsl.
 
 // Bsdf::reflection_terms() of the lobes that photons light.
 ReflectionTerms gathered_terms(Bsdf bsdf, double glossy_cutoff) {
@@ -25,4 +25,41 @@ ReflectionTerms gathered_terms(Bsdf bsdf, double glossy_cutoff) {
   if (b.exact && b.reflects && !b.all_mirror) terms.eta = float(b.eta);
   terms.specular = specular && b.roughness >= kDeltaRoughness;
   return terms;
+}
+
+// As reflect_photons_by_lobes() of rt/photons/photon_query.cpp: by the lobes of a surface with extensions that no ray follows.
+dvec3 gather_by_lobes(PhotonMap map, SurfacePoint surface, Bsdf bsdf, uint lobes, dvec3 shading_normal, inout bool done) {
+  const double kGrazing = 1e-3lf;
+  PhotonSearch search = search_photons(map, surface.position, surface.geometric_normal, surface.layer, map.radius);
+  dvec3 sum = dvec3(0.0lf);
+  while (next_photon(map, search)) {
+    PhotonLight light = map.lights.lights[search.index];
+    dvec3 direction = dvec3(photon_direction(light.direction));
+    double falls = dot(direction, surface.geometric_normal);
+    if (!(falls > 0.0lf)) continue;
+    double cosine = dot(direction, shading_normal) / max(falls, kGrazing);
+    sum += (double(search.weight) * cosine) * bsdf_sum(bsdf, lobes, direction) * dvec3(light.flux);
+  }
+  done = done && search_is_done(search);
+  dvec3 light = photon_density(map, map.radius) * sum;
+  return is_finite(light.r + light.g + light.b) ? light : dvec3(0.0lf);
+}
+
+// What photons bring to a surface whose lobes rays follow, but for those that are gathered from photons.
+dvec3 gathered_light(PhotonMaps photons, SurfacePoint surface, Bsdf bsdf, dvec3 shading_normal, double glossy_cutoff,
+                     inout bool done) {
+  if (!bsdf.extended) {
+    return light_by_photons(photons, surface, gathered_terms(bsdf, glossy_cutoff), shading_normal, false, kInfinity,
+                            dvec3(0.0lf), 0.0lf, done);
+  }
+  uint lobes = 0u;
+  for (uint lobe = 0u; lobe < kLobes; ++lobe) {
+    if (!is_followed(bsdf, lobe, glossy_cutoff) && bsdf_present(bsdf, lobe)) lobes |= 1u << lobe;
+  }
+  dvec3 light = dvec3(0.0lf);
+  if (lobes == 0u) return light;
+  for (uint which = 0u; which < 2u; ++which) {  // caustic and global ones
+    light += gather_by_lobes(photons.maps[which], surface, bsdf, lobes, shading_normal, done);
+  }
+  return light;
 }

@@ -15,6 +15,10 @@
 #include "media.glsl"
 #include "microfacets.glsl"
 #include "plain_bsdf.glsl"
+#include "sheen.glsl"
+#include "thin_film.glsl"
+#include "anisotropic_facets.glsl"
+#include "extended_bsdf.glsl"
 #include "bsdf.glsl"
 #include "path.glsl"
 #include "reflection_terms.glsl"
@@ -25,10 +29,9 @@
 void main() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
   PathVertex point = work.states.states[pixel_index].vertex;
-  ReflectionTerms terms = gathered_terms(point.bsdf, work.limits.glossy_cutoff);
   bool done = true;
-  dvec3 light = light_by_photons(PhotonMaps(work.photons), point.surface, terms, point.material.normal, false, kInfinity,
-                                 dvec3(0.0lf), 0.0lf, done);
+  dvec3 light = gathered_light(PhotonMaps(work.photons), point.surface, point.bsdf, point.material.normal,
+                               work.limits.glossy_cutoff, done);
   work.states.states[pixel_index].sum += point.throughput * light;
   note_cut_off(!done);
 }

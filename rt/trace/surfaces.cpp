@@ -278,17 +278,10 @@ const TextureRef& map_of_tangents(const Material& material) {
                                                        : extensions.anisotropy_texture;
 }
 
-<<<<<<< HEAD
-Surfaces::PlanePoint Surfaces::plane_point(const WorldTriangle& triangle, const glm::dvec3& origin,
-                                           const glm::dvec3& direction) const {
-=======
-}  // namespace
-
 /// Inline in both functions that have it: a call costs a tenth of meet().
 [[gnu::always_inline]] inline Surfaces::PlanePoint Surfaces::plane_point(const WorldTriangle& triangle,
                                                                          const glm::dvec3& origin,
                                                                          const glm::dvec3& direction) const {
->>>>>>> gd
   // Moeller and Trumbore 1997, relative to the ray's origin.
   const glm::dvec3 from_v0 = origin - triangle.v0;
   const glm::dvec3 p = glm::cross(direction, triangle.e2);
