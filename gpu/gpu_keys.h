@@ -4,10 +4,10 @@
 #include <optional>
 #include <span>
 
-#include "gpu/gpu_batch.h"
-#include "gpu/gpu_buffer.h"
-#include "gpu/gpu_device.h"
-#include "gpu/gpu_kernel.h"
+#include "gpu/device/gpu_batch.h"
+#include "gpu/device/gpu_buffer.h"
+#include "gpu/device/gpu_device.h"
+#include "gpu/device/gpu_kernel.h"
 #include "gpu/gpu_scene.h"
 #include "image/image.h"
 #include "image/key.h"

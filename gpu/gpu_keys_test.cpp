@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gpu/bvh.h"
-#include "gpu/test_gpu.h"
+#include "gpu/device/test_gpu.h"
 #include "rt/test_scene.h"
 #include "rt/trace/primary_rays.h"
 #include "scene/load_scene.h"

@@ -61,13 +61,13 @@ void GpuPrimaryRays::draw(const View& view, std::size_t screen, std::span<const 
   boxed.block = {view.block.x0 + box.x0, view.block.y0 + box.y0, view.block.x0 + box.x1, view.block.y0 + box.y1};
   const Image<Key> keys = keys_.draw(*held_.front().scene, boxed);
   for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
-    const TilePlace place = layout.place(tile);
-    const Rect drawn = place.screen == screen ? intersection(place.pixels, box) : Rect{};
+    const TilePlace location = layout.place(tile);
+    const Rect drawn = location.screen == screen ? intersection(location.pixels, box) : Rect{};
     for (const Rect& part : parts) {
       const Rect pixels = intersection(part, drawn);
       if (pixels.empty()) continue;
       layer.touch(tile);
-      if (merge(pixels, place.pixels, keys, box, layer.tile(tile))) layer.set_active(tile);
+      if (merge(pixels, location.pixels, keys, box, layer.tile(tile))) layer.set_active(tile);
     }
   }
 }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "gpu/gpu_device.h"
+#include "gpu/device/gpu_device.h"
 #include "gpu/gpu_keys.h"
 #include "gpu/gpu_scene.h"
 #include "image/tiles.h"

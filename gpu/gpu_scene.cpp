@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "gpu/bvh.h"
-#include "gpu/gpu_upload.h"
+#include "gpu/device/gpu_upload.h"
 
 namespace hpr {
 namespace {
@@ -155,9 +155,9 @@ class Builder {
       const glm::uvec3& corners = mesh.triangle(t);
       Bounds box = empty_bounds();
       for (int corner = 0; corner < 3; ++corner) {
-        const glm::dvec3 place = at(mesh.positions[corners[corner]]);
-        box.low = glm::min(box.low, place);
-        box.high = glm::max(box.high, place);
+        const glm::dvec3 moved = at(mesh.positions[corners[corner]]);
+        box.low = glm::min(box.low, moved);
+        box.high = glm::max(box.high, moved);
       }
       boxes.push_back(rounded(box));
     }

@@ -5,8 +5,8 @@
 #include <optional>
 #include <span>
 
-#include "gpu/gpu_device.h"
-#include "gpu/gpu_upload.h"
+#include "gpu/device/gpu_device.h"
+#include "gpu/device/gpu_upload.h"
 #include "scene/scene.h"
 
 namespace hpr {

@@ -607,9 +607,9 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
     state.shade_part(call, {.tile = order[i]});
   });
   state.gather_counts(watch.ms() * state.settings.threads);
-  if (left.size() == tiles.size()) return;
+  if (!state.device) return;
   state.counts += traced;
-  state.times.push_back({"device", device_ms});
+  state.times.push_back({"device", device_ms});  // also where there was nothing to do: ranks sum up step by step
   for (const std::size_t tile : tiles) state.costs.push_back({tile, device_ms / static_cast<double>(tiles.size())});
 }
 

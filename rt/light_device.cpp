@@ -28,11 +28,11 @@ std::vector<std::size_t> light_on_device(LightDevice* device, const DeviceTiles&
       unfinished.insert(tile);
       return;
     }
-    const TilePlace place = sample.keys->layout().place(tile);
-    const TileJob job{place.pixels,
+    const TilePlace location = sample.keys->layout().place(tile);
+    const TileJob job{location.pixels,
                       sample.number,
                       sample.keys->tile(tile),
-                      &sample.views[place.screen],
+                      &sample.views[location.screen],
                       0,
                       mask_of(sample.wanted, tile)};
     store_lit(job, tile, pixels, sample.output, traced);

@@ -11,7 +11,7 @@ import pathlib
 import re
 import sys
 
-ROOMS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "engine", "app", "tools", "bench", "tests"]
+ROOMS = ["core", "image", "scene", "cluster", "raster", "compositing", "rt", "walls", "engine", "app", "tools", "bench", "tests", "gpu"]
 
 # A pattern of whole identifiers (without a trailing _) -> the term of the field's literature that stands instead.
 DENIED = [

@@ -16,6 +16,7 @@ from program import expect, failures, run
 
 SIZE = (96, 72)
 OTHERS = 0.0005  # of the pixels may show another surface
+OTHERS_LIT = 0.05  # a ray of theirs meets another surface, or a sample more is taken
 SCENES = ("gen:cornell", "gen:gallery", "gen:sphereflake?s=2", "gen:tetra?s=5", "gen:asteroids", "gen:extensions", "gen:cloud?count=2000")
 SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "4") for distribution in ("sort-first", "sort-last", "hybrid")]
 
@@ -50,10 +51,28 @@ def keys_of_scenes(folder):
         expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
 
 
+def nearly_equal(folder, expected, found, what):
+    diff = json.loads(run(folder, "diff", expected, found, "--json").stdout)
+    expect(diff["relmse_untrimmed"] <= 1e-4 and diff["not_finite"] == 0, f"{what}: relMSE {diff['relmse_untrimmed']}")
+    expect(diff["differing"] <= OTHERS_LIT * diff["pixels"] or diff["max"] < 1e-3, f"{what}: {diff['differing']} pixels differ")
+
+
+def light_of_scenes(folder):
+    """By the same numbers along the same paths, so nearly the same pictures."""
+    for scene in SCENES:
+        for photons in ("0", "20000"):
+            settings = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "draft", "--spp", "1", "--photons", photons, "--force")
+            hpr(folder, "render", scene, "-o", "cpu.exr", "--primary", "rays", *settings)
+            said = hpr(folder, "render", scene, "-o", "gpu.exr", "--backend", "vulkan", "--explain", *settings)
+            expect("light: on the device" in said.stdout + said.stderr, f"{scene}: the CPU lights: {said.stderr[-400:]}")
+            nearly_equal(folder, "cpu.exr", "gpu.exr", scene)
+
+
 def spreads(folder):
-    alone = render(folder, "gen:gallery", "--backend", "vulkan", "--spp", "2")
+    lit = ("--backend", "vulkan", "--spp", "2", "--quality", "draft")
+    alone = render(folder, "gen:gallery", *lit)
     for spread in SPREADS:
-        expect(render(folder, "gen:gallery", "--backend", "vulkan", "--spp", "2", *spread) == alone, f"other bits with {' '.join(spread)}")
+        expect(render(folder, "gen:gallery", *lit, *spread) == alone, f"other bits with {' '.join(spread)}")
 
 
 def said_and_done(folder):
@@ -65,8 +84,10 @@ def said_and_done(folder):
     # What devices do not do is done by Embree or OpenGL, and looks the same.
     plain = render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned")
     expect(render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned", "--backend", "vulkan") == plain, "parts of scenes")
-    few = ("--spp", "20", "--adaptive", "--primary", "rays")
-    expect(render(folder, "gen:cornell", *few, "--backend", "vulkan")[1] == render(folder, "gen:cornell", *few)[1], "adaptive samples")
+    few = ("--size", "64x48", "--spp", "20", "--adaptive", "--primary", "rays", "--force")
+    hpr(folder, "render", "gen:cornell", "-o", "few.exr", *few)
+    hpr(folder, "render", "gen:cornell", "-o", "few-gpu.exr", "--backend", "vulkan", *few)
+    nearly_equal(folder, "few.exr", "few-gpu.exr", "adaptive samples")
     drawn = ("--primary", "raster", "--depth-format", "24")
     expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan") == render(folder, "gen:cornell", *drawn), "OpenGL beside Vulkan")
     said = hpr(folder, "render", "gen:gallery", "--size", "128x96", "-o", "d.png", "--backend", "vulkan", "--ranks", "3", "--distribute", "sort-last",
@@ -83,6 +104,7 @@ def main():
             print("Vulkan has no device here that can do hpr's work")
             return 77
         keys_of_scenes(folder)
+        light_of_scenes(folder)
         spreads(folder)
         said_and_done(folder)
     return 1 if failures else 0

@@ -32,7 +32,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/timing.h"
-#include "gpu/gpu_device.h"
+#include "gpu/device/gpu_device.h"
 #include "image/image_io.h"
 #include "raster/gl_context.h"
 #include "rt/trace/embree_compat.h"

@@ -6,16 +6,16 @@ Bsdf make_bsdf(MaterialPoint material, SurfacePoint surface, bool flux) {
 }
 
 bool bsdf_present(Bsdf b, uint lobe) {
-  return b.extended ? extended_present(b, lobe) : plain_present(b.plain, lobe);
+  return is_extended(b) ? extended_present(b, lobe) : plain_present(b.plain, lobe);
 }
 
 bool bsdf_is_delta(Bsdf b, uint lobe) {
-  return b.extended ? extended_is_delta(b, lobe) : plain_is_delta(b.plain, lobe);
+  return is_extended(b) ? extended_is_delta(b, lobe) : plain_is_delta(b.plain, lobe);
 }
 
 // f of one lobe, 1/sr, and the density of sampling that direction.
 dvec3 bsdf_lobe(Bsdf b, uint lobe, dvec3 to_light, out double pdf) {
-  if (b.extended) return extended_lobe(b, lobe, to_light, pdf);
+  if (is_extended(b)) return extended_lobe(b, lobe, to_light, pdf);
   return plain_lobe(b.plain, lobe, to_light, pdf);
 }
 
@@ -32,7 +32,7 @@ double bsdf_pdf(Bsdf b, uint lobe, dvec3 to_light) {
 
 // f and density of every lobe.
 Scattering bsdf_scattering(Bsdf b, dvec3 to_light) {
-  if (!b.extended) return plain_scattering(b.plain, to_light);
+  if (!is_extended(b)) return plain_scattering(b.plain, to_light);
   Scattering all;
   for (uint i = 0u; i < kLobes; ++i) {
     double pdf;
@@ -45,7 +45,7 @@ Scattering bsdf_scattering(Bsdf b, dvec3 to_light) {
 // The sum of f over the lobes whose bits `lobes` has.
 dvec3 bsdf_sum(Bsdf b, uint lobes, dvec3 to_light) {
   dvec3 sum = dvec3(0.0lf);
-  if (!b.extended) {
+  if (!is_extended(b)) {
     Scattering all = plain_scattering(b.plain, to_light);
     for (uint i = 0u; i < kCoat; ++i) sum += ((lobes >> i) & 1u) != 0u ? all.value[i] : dvec3(0.0lf);
     return sum;
@@ -69,16 +69,16 @@ dvec3 bsdf_total(Bsdf b, dvec3 to_light) {
 
 // False when the lobe is absent or the sample fails.
 bool bsdf_sample(Bsdf b, uint lobe, dvec2 u, out BsdfSample s) {
-  if (b.extended) return extended_sample(b, lobe, u, s);
+  if (is_extended(b)) return extended_sample(b, lobe, u, s);
   return plain_sample(b.plain, lobe, u, s);
 }
 
 dvec3 bsdf_weight(Bsdf b, uint lobe) {
-  return b.extended ? extended_weight(b, lobe) : plain_weight(b.plain, lobe);
+  return is_extended(b) ? extended_weight(b, lobe) : plain_weight(b.plain, lobe);
 }
 
 double bsdf_roughness(Bsdf b, uint lobe) {
-  return b.extended && lobe == kCoat ? b.extensions.clearcoat_roughness : b.plain.roughness;
+  return is_extended(b) && lobe == kCoat ? coat_roughness(b) : b.plain.roughness;
 }
 
 // The normal that lights are chosen by: zero where they may shine through.

@@ -17,6 +17,14 @@ struct Bsdf {
   double sheen_chance;
 };
 
+bool is_extended(Bsdf b) {
+  return b.extended;
+}
+
+double coat_roughness(Bsdf b) {
+  return b.extensions.clearcoat_roughness;
+}
+
 // Facets as rough, all reflecting.
 PlainBsdf white_facets(Bsdf b) {
   PlainBsdf facets = b.plain;

@@ -48,7 +48,7 @@ dvec3 gather_by_lobes(PhotonMap map, SurfacePoint surface, Bsdf bsdf, uint lobes
 // What photons bring to a surface whose lobes rays follow, but for those that are gathered from photons.
 dvec3 gathered_light(PhotonMaps photons, SurfacePoint surface, Bsdf bsdf, dvec3 shading_normal, double glossy_cutoff,
                      inout bool done) {
-  if (!bsdf.extended) {
+  if (!is_extended(bsdf)) {
     return light_by_photons(photons, surface, gathered_terms(bsdf, glossy_cutoff), shading_normal, false, kInfinity,
                             dvec3(0.0lf), 0.0lf, done);
   }

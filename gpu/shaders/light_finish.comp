@@ -14,12 +14,7 @@
 #include "materials.glsl"
 #include "media.glsl"
 #include "microfacets.glsl"
-#include "plain_bsdf.glsl"
-#include "sheen.glsl"
-#include "thin_film.glsl"
-#include "anisotropic_facets.glsl"
-#include "extended_bsdf.glsl"
-#include "bsdf.glsl"
+#include "all_bsdfs.glsl"
 #include "path.glsl"
 #include "light_state.glsl"
 

@@ -1,4 +1,4 @@
-// All that gives light in a scene, as gpu/gpu_lights.h lays it out: rt/lights/light_sampler.h. Lights are numbered: punctual
+// All that gives light in a scene, as gpu/light/gpu_lights.h lays it out: rt/lights/light_sampler.h. Lights are numbered: punctual
 // ones, triangles, the environment.
 // Needs light_tree.glsl, punctual_lights.glsl, environment.glsl and triangle_lights.glsl, and what they need.
 

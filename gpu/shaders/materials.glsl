@@ -1,4 +1,4 @@
-// Materials, as gpu/gpu_materials.h lays them out, and what they are where a surface was met: rt/materials/material_point.h.
+// Materials, as gpu/light/gpu_materials.h lays them out, and what they are where a surface was met: rt/materials/material_point.h.
 // Needs reals.glsl, surface_point.glsl and textures.glsl.
 
 const uint kOpaque = 0u;
@@ -124,7 +124,9 @@ struct MaterialPoint {
   bool unlit;
   bool solid;
   bool extended;  // whether its extensions have an effect
+#ifndef PLAIN_MATERIALS
   ExtensionPoint extensions;
+#endif
 };
 
 ExtensionPoint plain_extensions() {
@@ -165,7 +167,9 @@ MaterialPoint plain_material() {
   point.unlit = false;
   point.solid = false;
   point.extended = false;
+#ifndef PLAIN_MATERIALS
   point.extensions = plain_extensions();
+#endif
   return point;
 }
 
@@ -336,6 +340,7 @@ bool has_effect(ExtensionPoint point) {
          point.diffuse_transmission > 0.0lf;
 }
 
+#ifndef PLAIN_MATERIALS
 void add_extensions(Materials materials, Material material, SurfacePoint surface, inout MaterialPoint point) {
   const double kHalfOfTwentieth = 0.025lf;
   if (material.thickness > 0.0 && point.ior > 1.0lf) {
@@ -352,6 +357,7 @@ void add_extensions(Materials materials, Material material, SurfacePoint surface
   point.solid = true;
   point.absorption = material.absorption;
 }
+#endif
 
 // The material with its textures read at the surface's coordinates, vertex colours and normal map applied.
 MaterialPoint evaluate_material(Materials materials, SurfacePoint surface) {
@@ -386,7 +392,9 @@ MaterialPoint evaluate_material(Materials materials, SurfacePoint surface) {
   }
   // What is not there for who looks from behind sends no light there either.
   if (surface.inside && material.shows_both_sides == 0u) point.emission = dvec3(0.0lf);
+#ifndef PLAIN_MATERIALS
   if (material.extensions >= 0) add_extensions(materials, material, surface, point);
+#endif
   if (!(material.transmission > 0.0)) return point;
   point.transmission = textured_factor(material.transmission, texels[kTransmissionTexture].r);
   point.solid = material.thickness > 0.0;

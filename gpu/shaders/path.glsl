@@ -87,7 +87,7 @@ void choose_followed(PathLimits limits, inout PathVertex point) {
     ways += point.may_follow[lobe] ? 1u : 0u;
   }
   if (point.depth < kChoosingDepth || ways < 2u) return;
-  if (!point.bsdf.extended) {
+  if (!is_extended(point.bsdf)) {
     double fraction = clamp(bright[kReflection] / (bright[kReflection] + bright[kTransmission]), 0.1lf, 0.9lf);
     bool reflects = next_one(point.random) < fraction;
     double kept = in_single(reflects ? 1.0lf / fraction : 1.0lf / (1.0lf - fraction));

@@ -1,5 +1,5 @@
 // Light that photons bring: the search of rt/photons/photon_map.h and photon_query.h, and PhotonPass. Maps lie as
-// gpu/gpu_photons.h puts them. Needs reals.glsl, surface_point.glsl and reflection_terms.glsl.
+// gpu/light/gpu_photons.h puts them. Needs reals.glsl, surface_point.glsl and reflection_terms.glsl.
 
 struct PhotonPlace {
   vec3 position;  // ray space

@@ -1,4 +1,4 @@
-// Textures, as gpu/gpu_textures.h lays them out, and sample_texture of rt/materials/material_point.h, to the bit.
+// Textures, as gpu/light/gpu_textures.h lays them out, and sample_texture of rt/materials/material_point.h, to the bit.
 // Needs reals.glsl.
 
 const uint kRepeat = 0u;

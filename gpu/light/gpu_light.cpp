@@ -1,0 +1,295 @@
+#include "gpu/light/gpu_light.h"
+
+#include <hpr/shaders/light_ambient.h>
+#include <hpr/shaders/light_ambient_plain.h>
+#include <hpr/shaders/light_direct.h>
+#include <hpr/shaders/light_direct_plain.h>
+#include <hpr/shaders/light_finish.h>
+#include <hpr/shaders/light_finish_plain.h>
+#include <hpr/shaders/light_follow.h>
+#include <hpr/shaders/light_follow_plain.h>
+#include <hpr/shaders/light_photons.h>
+#include <hpr/shaders/light_photons_plain.h>
+#include <hpr/shaders/light_start.h>
+#include <hpr/shaders/light_start_plain.h>
+#include <hpr/shaders/light_vertex.h>
+#include <hpr/shaders/light_vertex_plain.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "core/error.h"
+#include "gpu/gpu_view.h"
+#include "rt/passes/pass.h"
+#include "rt/passes/path_vertex.h"
+#include "rt/sampling/sampler.h"
+
+namespace hpr {
+namespace {
+
+/// As in light_state.glsl.
+struct GpuTile {
+  glm::ivec2 corner{0};
+  glm::uvec2 size{0};
+  std::uint32_t view = 0;
+  std::uint32_t padding = 0;
+};
+
+struct GpuPathLimits {
+  double glossy_cutoff = 0.0;
+  std::uint32_t max_depth = 0;
+  std::uint32_t followed = 0;
+};
+
+struct GpuLightInput {
+  std::uint64_t scene = 0;
+  std::uint64_t surfaces = 0;
+  std::uint64_t materials = 0;
+  std::uint64_t lights = 0;
+  std::uint64_t photons = 0;
+  std::uint64_t tiles = 0;
+  std::uint64_t keys = 0;
+  std::uint64_t pixels = 0;
+  std::uint64_t states = 0;
+  std::uint64_t waiting = 0;
+  std::uint64_t views = 0;
+  std::uint64_t eye_media = 0;
+  std::uint64_t counters = 0;
+  std::uint64_t random_frame = 0;
+  glm::dvec3 background{0.0};
+  double ambient = 0.0;
+  double occlusion_reach = 0.0;
+  GpuPathLimits limits;
+  std::uint32_t shows_environment = 0;
+  std::uint32_t sample_index = 0;
+  std::uint32_t light_samples = 1;
+  std::uint32_t occlusion_rays = 0;
+  std::uint32_t shadows = 0;
+  std::uint32_t terminator_fix = 0;
+};
+static_assert(sizeof(GpuLightInput) == 192);
+
+struct Constants {
+  std::uint64_t input;
+  std::uint32_t tile_count;
+  std::uint32_t padding;
+};
+
+/// As light_state.glsl counts rays; behind them the pixels that are not done.
+constexpr std::array kCountedPasses{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion};
+
+constexpr std::size_t kCounters = kCountedPasses.size() + 1;
+constexpr std::size_t kMaxWaiting = 12;
+
+/// Lit at once: a batch has a time limit, and each pixel has kilobytes of memory while it is lit.
+constexpr std::size_t kSoftwareTiles = 4;
+constexpr std::size_t kTiles = 32;
+/// Vertices of each pixel that are shaded before the CPU asks whether all is done.
+constexpr int kRounds = 2;
+
+/// The kernels' shaders: for scenes with extensions of materials, or without any.
+struct Shaders {
+  std::span<const std::uint32_t> start;
+  std::span<const std::uint32_t> vertex;
+  std::span<const std::uint32_t> direct;
+  std::span<const std::uint32_t> ambient;
+  std::span<const std::uint32_t> photons;
+  std::span<const std::uint32_t> follow;
+  std::span<const std::uint32_t> finish;
+};
+
+Shaders shaders_for(const Scene& scene) {
+  const bool extended =
+      std::ranges::any_of(scene.materials, [](const Material& material) { return material.extensions != nullptr; });
+  if (extended) {
+    return {light_start, light_vertex, light_direct, light_ambient, light_photons, light_follow, light_finish};
+  }
+  return {light_start_plain,   light_vertex_plain, light_direct_plain, light_ambient_plain,
+          light_photons_plain, light_follow_plain, light_finish_plain};
+}
+
+/// A tile that was not finished covers so little, see kUnfinished in light_state.glsl.
+bool is_finished(std::span<const glm::vec4> pixels) {
+  return std::ranges::none_of(pixels, [](const glm::vec4& pixel) { return pixel.a < 0.0F; });
+}
+
+GpuPathLimits limits_of(const LightSources& sources) {
+  GpuPathLimits limits{.glossy_cutoff = sources.settings.glossy_cutoff,
+                       .max_depth = static_cast<std::uint32_t>(sources.settings.max_depth)};
+  for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
+    if (sources.followed_lobes.at(lobe)) limits.followed |= 1U << lobe;
+  }
+  return limits;
+}
+
+bool emits_through_coat(const Material& material) {
+  return material.extensions && material.extensions->clearcoat > 0.0F && material.emissive != glm::vec3(0.0F);
+}
+
+void grow_to(const GpuDevice& device, std::optional<GpuBuffer>& buffer, std::size_t bytes, GpuMemory memory) {
+  if (buffer && buffer->bytes() >= bytes) return;
+  buffer.reset();
+  buffer.emplace(device, bytes, memory);
+}
+
+}  // namespace
+
+std::string refusal_of_light(const Scene& scene, const RaySettings& settings, std::span<const PassPlan> plan) {
+  if (settings.show != Show::Shaded) return "what is shown is no light";
+  if (settings.reference) return "the reference is the CPU's";
+  if (settings.denoise) return "the denoiser is the CPU's";
+  if (!settings.half_resolution.empty()) return "passes at half resolution are the CPU's";
+  if (settings.part) return "rays travel between ranks";
+  if (runs_pass(plan, PassId::Gather)) return "gathering by rays is the CPU's";
+  if (has_coverage(scene)) return "surfaces that cover in part are the CPU's";
+  if (std::ranges::any_of(scene.materials, emits_through_coat)) return "emission through clear coats is the CPU's";
+  return {};
+}
+
+GpuLight::GpuLight(const GpuDevice& device, const LightSources& sources, int threads)
+    : device_(device),
+      sources_(sources),
+      scene_(device, sources.scene, std::array{SurfaceRange{0, sources.scene.triangles}}, threads),
+      surfaces_(device, sources.scene, sources.surfaces),
+      materials_(device, sources.scene),
+      lights_(device, sources.scene, sources.lights, materials_),
+      photons_(device),
+      start_(device, shaders_for(sources.scene).start, sizeof(Constants)),
+      vertex_(device, shaders_for(sources.scene).vertex, sizeof(Constants)),
+      direct_(device, shaders_for(sources.scene).direct, sizeof(Constants)),
+      follow_(device, shaders_for(sources.scene).follow, sizeof(Constants)),
+      finish_(device, shaders_for(sources.scene).finish, sizeof(Constants)),
+      input_(device, sizeof(GpuLightInput), GpuMemory::Upload),
+      counters_(device, kCounters * sizeof(std::uint32_t), GpuMemory::Readback),
+      batch_(device) {
+  const Shaders shaders = shaders_for(sources.scene);
+  state_bytes_ = array_stride(shaders.vertex, "PixelState");
+  waiting_bytes_ = kMaxWaiting * array_stride(shaders.vertex, "FoundVertex");
+  if (runs_pass(sources.plan, PassId::AmbientOcclusion)) ambient_.emplace(device, shaders.ambient, sizeof(Constants));
+  if (runs_pass(sources.plan, PassId::Photon)) photon_.emplace(device, shaders.photons, sizeof(Constants));
+  compile();
+}
+
+/// Software devices compile a kernel when it runs first, which takes seconds: each for itself, as waits have a limit.
+void GpuLight::compile() {
+  if (!device_.info().software) return;
+  std::vector<const GpuKernel*> kernels{&start_, &vertex_, &direct_, &follow_, &finish_};
+  for (const auto* optional : {&ambient_, &photon_}) {
+    if (*optional) kernels.push_back(&**optional);
+  }
+  for (const GpuKernel* kernel : kernels) {
+    batch_.run(*kernel, 1, Constants{input_.address(), 0, 0});
+    batch_.submit();
+    batch_.wait();
+  }
+}
+
+/// Memory for so many tiles that are lit at once.
+void GpuLight::grow(std::size_t tiles, std::size_t views) {
+  grow_to(device_, views_, views * sizeof(GpuView), GpuMemory::Upload);
+  grow_to(device_, eye_media_, views * sizeof(Media), GpuMemory::Upload);
+  grow_to(device_, tiles_, tiles * sizeof(GpuTile), GpuMemory::Upload);
+  grow_to(device_, keys_, tiles * kTilePixels * sizeof(Key), GpuMemory::Upload);
+  grow_to(device_, pixels_, tiles * kTilePixels * sizeof(glm::vec4), GpuMemory::Device);
+  grow_to(device_, states_, tiles * kTilePixels * state_bytes_, GpuMemory::Device);
+  grow_to(device_, waiting_, tiles * kTilePixels * waiting_bytes_, GpuMemory::Device);
+  grow_to(device_, read_, tiles * kTilePixels * sizeof(glm::vec4), GpuMemory::Readback);
+}
+
+void GpuLight::shade(const DeviceTiles& lit, RayCounts& counts, const Store& store) {
+  const std::size_t most = device_.info().software ? kSoftwareTiles : kTiles;
+  if (lit.photons != nullptr) photons_.put(*lit.photons);
+  for (const ShadedSample& sample : lit.samples) {
+    for (std::size_t first = 0; first < lit.tiles.size(); first += most) {
+      if (lit.is_overtaken && lit.is_overtaken()) return;
+      shade_some(lit, sample, lit.tiles.subspan(first, std::min(most, lit.tiles.size() - first)), counts, store);
+    }
+  }
+}
+
+/// Shades vertex after vertex of all pixels' paths, until none waits, and reads what they add up to.
+void GpuLight::follow_paths(std::size_t tiles, bool gathers_photons) {
+  const std::size_t pixels = tiles * kTilePixels;
+  const Constants constants{input_.address(), static_cast<std::uint32_t>(tiles), 0};
+  std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kCountedPasses.size()];
+  batch_.run(start_, pixels, constants);
+  do {
+    waiting = 0;
+    for (int round = 0; round < kRounds; ++round) {
+      batch_.run(vertex_, pixels, constants);
+      batch_.run(direct_, pixels, constants);
+      if (ambient_) batch_.run(*ambient_, pixels, constants);
+      if (photon_ && gathers_photons) batch_.run(*photon_, pixels, constants);
+      batch_.run(follow_, pixels, constants);
+    }
+    batch_.submit();
+    batch_.wait();
+  } while (waiting > 0);
+  batch_.run(finish_, pixels, constants);
+  batch_.copy(*pixels_, *read_, pixels * sizeof(glm::vec4));
+  batch_.submit();
+  batch_.wait();
+}
+
+void GpuLight::shade_some(const DeviceTiles& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
+                          RayCounts& counts, const Store& store) {
+  const FrameLayout& layout = sample.keys->layout();
+  const RaySettings& settings = sources_.settings;
+  grow(tiles.size(), sample.views.size());
+  for (std::size_t i = 0; i < sample.views.size(); ++i) {
+    views_->mapped<GpuView>()[i] = as_read(sample.views[i]);
+    eye_media_->mapped<Media>()[i] = lit.eyes[i];
+  }
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const TilePlace location = layout.place(tiles[i]);
+    tiles_->mapped<GpuTile>()[i] = {{location.pixels.x0, location.pixels.y0},
+                                    {location.pixels.width(), location.pixels.height()},
+                                    static_cast<std::uint32_t>(location.screen),
+                                    static_cast<std::uint32_t>(i)};
+    std::ranges::copy(sample.keys->tile(tiles[i]), keys_->mapped<Key>().subspan(i * kTilePixels).begin());
+  }
+  GpuLightInput input{.scene = scene_.address(),
+                      .surfaces = surfaces_.address(),
+                      .materials = materials_.address(),
+                      .lights = lights_.address(),
+                      .photons = lit.photons != nullptr ? photons_.address() : 0,
+                      .tiles = tiles_->address(),
+                      .keys = keys_->address(),
+                      .pixels = pixels_->address(),
+                      .states = states_->address(),
+                      .waiting = waiting_->address(),
+                      .views = views_->address(),
+                      .eye_media = eye_media_->address(),
+                      .counters = counters_.address(),
+                      .random_frame = frame_stream({settings.seed, sample.number.frame}),
+                      .ambient = settings.ambient,
+                      .occlusion_reach = occlusion_reach(sources_.scene),
+                      .limits = limits_of(sources_),
+                      .sample_index = sample.number.sample,
+                      .light_samples = static_cast<std::uint32_t>(settings.light_samples),
+                      .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
+  input.shows_environment = settings.background.kind == Background::Kind::Environment ? 1 : 0;
+  if (settings.background.kind == Background::Kind::Color) {
+    const Rgb& color = settings.background.color;
+    input.background = {color.r, color.g, color.b};
+  }
+  input.shadows = runs_pass(sources_.plan, PassId::Shadow) ? 1 : 0;
+  input.terminator_fix = settings.terminator_fix ? 1 : 0;
+  input_.mapped<GpuLightInput>()[0] = input;
+  std::ranges::fill(counters_.mapped<std::uint32_t>(), 0U);
+
+  follow_paths(tiles.size(), lit.photons != nullptr);
+
+  const std::span<const glm::vec4> pixels = read_->mapped<const glm::vec4>();
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const auto tile = pixels.subspan(i * kTilePixels, kTilePixels);
+    store(sample, tiles[i], is_finished(tile) ? tile : std::span<const glm::vec4>());
+  }
+  for (std::size_t i = 0; i < kCountedPasses.size(); ++i) {
+    counts[kCountedPasses.at(i)] += counters_.mapped<std::uint32_t>()[i];
+  }
+}
+
+}  // namespace hpr

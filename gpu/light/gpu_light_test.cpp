@@ -1,0 +1,192 @@
+#include "gpu/light/gpu_light.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpu/device/test_gpu.h"
+#include "rt/test_scene.h"
+#include "rt/trace/primary_rays.h"
+#include "scene/load_scene.h"
+#include "scene/requirements.h"
+
+namespace hpr {
+namespace {
+
+using test::add_material;
+using test::add_mesh;
+using test::place_mesh;
+using test::quad;
+
+View view_of(const Scene& scene, const Size& size) {
+  View view = make_view(scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front(), size, scene.bounds);
+  view.jitter = {0.21, -0.37};
+  view.screen_number = 2;
+  return view;
+}
+
+/// One view's pixels, lit by the CPU or by a device.
+struct Lit {
+  std::vector<Rgb> pixels;
+  std::vector<float> coverage;
+  RayCounts counts;
+};
+
+class GpuLightTest : public test::OnGpu {
+ protected:
+  Lit light(const Scene& scene, const RaySettings& settings, const View& view, bool by_device,
+            const SampleNumber& number = {3, 5}) {
+    const Requirements requirements = requirements_of(scene);
+    const RayScene rays(scene, RaySpace(scene), 2, covering_surfaces(scene, false));
+    const FrameLayout layout({view.size()});
+    TileLayer<Key> keys(layout);
+    PrimaryRays(scene, rays, 2).draw(view, 0, std::array{Rect{0, 0, view.size().width, view.size().height}}, keys);
+    EXPECT_EQ(refusal_of_light(scene, settings, plan_passes(requirements, settings)), "");
+    MakeLightDevice make;
+    if (by_device) {
+      make = [&](const LightSources& sources) { return std::make_unique<GpuLight>(device(), sources, 2); };
+    }
+    DeferredShader shader(scene, settings, requirements, {}, nullptr, make);
+    EXPECT_EQ(shader.lights_on_device(), by_device);
+    TileLayer<Rgb> radiance(layout);
+    TileLayer<float> coverage(layout);
+    std::vector<std::size_t> tiles(layout.tiles());
+    std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+    shader.shade(std::array{view}, keys, tiles, {.radiance = &radiance, .coverage = &coverage}, number);
+    Lit lit;
+    for (int y = 0; y < view.size().height; ++y) {
+      for (int x = 0; x < view.size().width; ++x) {
+        lit.pixels.push_back(radiance.at(0, x, y));
+        lit.coverage.push_back(coverage.at(0, x, y));
+      }
+    }
+    lit.counts = shader.counts();
+    return lit;
+  }
+
+  /// Expects that a device lights as the CPU does: the same numbers lead the same rays, so pixels are equal but where a
+  /// ray meets an edge.
+  void expect_as_cpu(const Scene& scene, const RaySettings& settings, const View& view, const std::string& what,
+                     double others = 0.01) {
+    SCOPED_TRACE(what);
+    const Lit cpu = light(scene, settings, view, false);
+    const Lit gpu = light(scene, settings, view, true);
+    double sum = 0.0;
+    double other_sum = 0.0;
+    std::size_t lit = 0;
+    std::size_t off = 0;
+    for (std::size_t i = 0; i < cpu.pixels.size(); ++i) {
+      const glm::dvec3 a(cpu.pixels[i].r, cpu.pixels[i].g, cpu.pixels[i].b);
+      const glm::dvec3 b(gpu.pixels[i].r, gpu.pixels[i].g, gpu.pixels[i].b);
+      const double bright = std::max({a.r, a.g, a.b});
+      sum += a.r + a.g + a.b;
+      other_sum += b.r + b.g + b.b;
+      lit += bright > 0.0 ? 1U : 0U;
+      off += glm::distance(a, b) > 1e-4 * bright + 1e-7 ? 1U : 0U;
+      ASSERT_EQ(cpu.coverage[i], gpu.coverage[i]) << i;
+    }
+    const auto pixels = static_cast<double>(cpu.pixels.size());
+    EXPECT_GT(static_cast<double>(lit), 0.2 * pixels);
+    EXPECT_LE(static_cast<double>(off), others * pixels);
+    EXPECT_NEAR(other_sum / sum, 1.0, 0.005);
+    for (const PassId pass : {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion}) {
+      const auto traced = static_cast<double>(cpu.counts[pass]);
+      EXPECT_NEAR(static_cast<double>(gpu.counts[pass]), traced, 0.01 * traced + 1.0) << static_cast<int>(pass);
+    }
+  }
+};
+
+RaySettings plain_settings() {
+  RaySettings settings;
+  settings.threads = 2;
+  return settings;
+}
+
+TEST_F(GpuLightTest, IsThatOfTheCpu) {
+  const Scene scene = load_scene("gen:gallery");
+  expect_as_cpu(scene, plain_settings(), view_of(scene, {64, 48}), "gallery");
+}
+
+TEST_F(GpuLightTest, HasExtensions) {
+  const Scene scene = load_scene("gen:extensions");
+  expect_as_cpu(scene, plain_settings(), view_of(scene, {64, 48}), "extensions");
+}
+
+/// A room with textures, normal maps, a solid that absorbs and disperses, and an even sky that comes in by a window.
+Scene furnished_room() {
+  Scene scene = load_scene("gen:cornell");
+  scene.environment = test::even_light({0.4F, 0.5F, 0.7F});
+  Image<Rgba8> checks({4, 4});
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const auto level = static_cast<std::uint8_t>(60 + 40 * ((x + y) % 4));
+      checks.at(x, y) = {level, static_cast<std::uint8_t>(240 - level), 230, 255};
+    }
+  }
+  scene.textures.emplace_back().image = std::move(checks);
+  Material tiles = test::diffuse();
+  tiles.base_color_texture.texture = tiles.normal_texture.texture = tiles.metallic_roughness_texture.texture =
+      static_cast<int>(scene.textures.size()) - 1;
+  tiles.ior = 1.5F;
+  Material jelly = test::clear_glass(1.4F, 1.0F);
+  jelly.attenuation_distance = 0.3F;
+  jelly.attenuation_color = {0.9F, 0.4F, 0.2F};
+  const std::uint32_t ball = add_mesh(scene, test::sphere(0.25, 10, add_material(scene, jelly)));
+  const std::uint32_t picture =
+      add_mesh(scene, quad({-0.4F, -0.3F, 0}, {0.8F, 0, 0}, {0, 0.6F, 0}, add_material(scene, tiles)));
+  const glm::dvec3 center = 0.5 * scene.bounds.low + 0.5 * scene.bounds.high;
+  const double size = 0.5 * (scene.bounds.high.y - scene.bounds.low.y);
+  place_mesh(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), center), glm::dvec3(size)));
+  place_mesh(scene, picture,
+             glm::scale(glm::translate(glm::dmat4(1.0), center - glm::dvec3(0.3 * size, -0.4 * size, 0.5 * size)),
+                        glm::dvec3(size)));
+  finish_scene(scene);
+  return scene;
+}
+
+TEST_F(GpuLightTest, GathersPhotonsAndLooksThroughMedia) {
+  const Scene scene = furnished_room();
+  RaySettings settings = plain_settings();
+  settings.passes = {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion, PassId::Photon};
+  settings.photons = 20'000;
+  settings.global_photons = true;
+  settings.light_samples = 2;
+  expect_as_cpu(scene, settings, view_of(scene, {64, 48}), "room");
+}
+
+/// What a thread's loops may not do on a software device is done by the CPU.
+TEST_F(GpuLightTest, LeavesToTheCpuWhatItCannotFinish) {
+  if (!device().info().software) GTEST_SKIP() << "GPUs do not end loops";
+  Scene scene = test::white_floor();
+  Light lamp;
+  lamp.position = {0.5, 3.0, 0.0};
+  lamp.intensity = glm::vec3(20.0F);
+  scene.lights.push_back(lamp);
+  // Rays to the lamp pass the empty halves of so many boxes.
+  Mesh slopes;
+  for (int i = 0; i < 30'000; ++i) {
+    const auto first = static_cast<std::uint32_t>(slopes.positions.size());
+    const float side = 4.0F + 1e-5F * static_cast<float>(i);
+    slopes.positions.insert(slopes.positions.end(),
+                            {{-side, 0.5F, side}, {side, 2.5F, side}, {side, 2.5F, side + 0.1F}});
+    slopes.positions.insert(slopes.positions.end(),
+                            {{-side, 0.5F, -side}, {-side, 2.5F, side}, {-side, 2.5F, side + 0.1F}});
+    slopes.triangles.emplace_back(first, first + 1, first + 2);
+    slopes.triangles.emplace_back(first + 3, first + 4, first + 5);
+  }
+  place_mesh(scene, add_mesh(scene, slopes));
+  finish_scene(scene);
+  const View view = view_of(scene, {32, 24});
+  const Lit cpu = light(scene, plain_settings(), view, false);
+  const Lit gpu = light(scene, plain_settings(), view, true);
+  EXPECT_EQ(gpu.pixels, cpu.pixels);
+}
+
+}  // namespace
+}  // namespace hpr
