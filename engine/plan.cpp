@@ -366,11 +366,20 @@ void choose_indirect(Session& session, const FrameSettings& settings, FramePlan&
                                        plan.rays.gather ? "rays" : "photons", 100.0 * *open));
 }
 
+/// Why no device lights these views; empty: one does.
+std::string refusal_of_light(const Session& session, const FramePlan& plan, std::span<const View> views) {
+  if (std::ranges::any_of(views, [](const View& view) { return view.points.has_value(); })) {
+    return "pixels that look through points are the CPU's";
+  }
+  if (!plan.aovs.empty()) return "further layers (--aov) are the CPU's";
+  return session.refusal_of_light(plan.rays);
+}
+
 /// Whether a device lights, where one was asked for, and why not.
-void choose_light(const Session& session, FramePlan& plan) {
+void choose_light(const Session& session, FramePlan& plan, std::span<const View> views) {
   if (!session.has_gpu() || !needs_light(plan.rays.show)) return;
-  const std::string refusal = session.refusal_of_light(plan.rays);
-  plan.light_on_device = refusal.empty();
+  const std::string refusal = refusal_of_light(session, plan, views);
+  plan.rays.on_device = refusal.empty();
   plan.explained.push_back(refusal.empty() ? "light: on the device" : fmt::format("light: by the CPU ({})", refusal));
 }
 
@@ -504,7 +513,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   fit_photons(session, settings, plan, views);
-  choose_light(session, plan);
+  choose_light(session, plan, views);
   plan_areas(session, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   if (plan.verify_percent > 0.0) {

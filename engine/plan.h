@@ -29,7 +29,6 @@ struct FramePlan {
   std::string strategy;
   Primary primary = Primary::Raster;  ///< never Auto
   bool keys_on_device = false;        ///< rays by the session's gpu_primary_rays()
-  bool light_on_device = false;       ///< a device lights, see GpuLight
   DepthFormat depth_format = DepthFormat::Float32;
   Shading shading = Shading::Deferred;
   RaySettings rays;

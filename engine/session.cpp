@@ -20,7 +20,7 @@
 #include "engine/balance/load_balance.h"
 #include "gpu/device/gpu_device.h"
 #include "gpu/gpu_primary_rays.h"
-#include "gpu/light/gpu_light.h"
+#include "gpu/light/gpu_tile_shader.h"
 #include "raster/chunk_bounds.h"
 #include "raster/gl_context.h"
 #include "raster/raster_speed.h"
@@ -104,7 +104,13 @@ void Session::start_vulkan() {
   const GpuInfo& device = gpu_->info();
   log::debug("Vulkan: {}, {}", device.name, device.driver);
   const auto by_cpu = all_gather_value(comm_, device.software ? 1 : 0);
+  const std::vector<std::string> devices = all_gather_texts(comm_, device.name + ", " + device.driver);
   if (comm_.rank() != 0) return;
+  const auto other = std::ranges::find_if(devices, [&](const std::string& each) { return each != devices.front(); });
+  if (other != devices.end()) {
+    log::warning("rank {} has another device than rank 0 ({}; {}): pictures may differ in last bits, and at edges",
+                 other - devices.begin(), *other, devices.front());
+  }
   std::vector<std::size_t> ranks;
   for (std::size_t rank = 0; rank < by_cpu.size(); ++rank) {
     if (by_cpu[rank] != 0) ranks.push_back(rank);
@@ -382,10 +388,11 @@ DeferredShader& Session::shader(const RaySettings& settings) {
     RaySettings own = settings;
     own.threads = host_.threads;
     own.host_ranks = host_.ranks;
-    MakeLightDevice make_device;
-    if (gpu_ && refusal_of_light(own).empty()) {
-      make_device = [this](const LightSources& sources) {
-        return std::make_unique<GpuLight>(*gpu_, sources, host_.threads);
+    MakeTileShader make_device;
+    if (own.on_device) {
+      HPR_CHECK(gpu_ && refusal_of_light(own).empty());
+      make_device = [this](const ShadingInputs& sources) {
+        return std::make_unique<GpuTileShader>(*gpu_, sources, host_.threads);
       };
     }
     shader_ = std::make_unique<DeferredShader>(

@@ -5,6 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "core/error.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -29,6 +30,7 @@ struct GpuView {
 static_assert(sizeof(GpuView) == 192);
 
 [[nodiscard]] inline GpuView as_read(const View& view) {
+  HPR_CHECK(!view.points);
   GpuView read;
   read.eye = view.eye;
   read.axes = {view.axes[0], view.axes[1], view.axes[2]};

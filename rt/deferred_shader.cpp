@@ -14,7 +14,6 @@
 #include "core/timing.h"
 #include "rt/denoise/coverage_fragments.h"
 #include "rt/denoise/denoiser.h"
-#include "rt/light_device.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/half_resolution.h"
 #include "rt/passes/pass.h"
@@ -25,6 +24,7 @@
 #include "rt/reference/path_tracer.h"
 #include "rt/show/show_pixels.h"
 #include "rt/tile_scratch.h"
+#include "rt/tile_shader.h"
 #include "rt/trace/ray_forwarding.h"
 #include "rt/trace/ray_scene.h"
 
@@ -95,10 +95,10 @@ struct DeferredShader::State {
   std::vector<TileCost> costs;  ///< of the parts that the last shade() shaded
 
   RayForwarding* forwarding;
-  std::unique_ptr<LightDevice> device;  ///< null: the CPU lights all
+  std::unique_ptr<TileShader> device;  ///< null: the CPU lights all
 
   State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
-        RayForwarding* others, const MakeLightDevice& make_device);
+        RayForwarding* others, const MakeTileShader& make_device);
   void build_rays(const RaySource& source);
   const RayScene& build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects);
   void build_photons();
@@ -145,7 +145,7 @@ struct DeferredShader::State {
 };
 
 DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
-                             const RaySource& source, RayForwarding* others, const MakeLightDevice& make_device)
+                             const RaySource& source, RayForwarding* others, const MakeTileShader& make_device)
     : scene(lit),
       settings(std::move(chosen)),
       plan(plan_passes(requirements, settings)),
@@ -509,7 +509,7 @@ void DeferredShader::State::gather_counts(double spent_ms) {
 }
 
 DeferredShader::DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements,
-                               const RaySource& rays, RayForwarding* forwarding, const MakeLightDevice& make_device)
+                               const RaySource& rays, RayForwarding* forwarding, const MakeTileShader& make_device)
     : state_(std::make_unique<State>(scene, std::move(settings), requirements, rays, forwarding, make_device)) {}
 DeferredShader::~DeferredShader() = default;
 DeferredShader::DeferredShader(DeferredShader&&) noexcept = default;
@@ -596,7 +596,7 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   const Stopwatch watch;
   RayCounts traced;
   const std::vector<std::size_t> left =
-      light_on_device(state.device.get(), {samples, tiles, call.eyes, call.photons, is_overtaken}, traced);
+      shade_on_device(state.device.get(), {samples, tiles, call.eyes, call.photons, is_overtaken}, traced);
   const double device_ms = watch.ms() * state.settings.threads;
   const std::vector<std::size_t> order = fullest_first(left, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
@@ -609,7 +609,7 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   state.gather_counts(watch.ms() * state.settings.threads);
   if (!state.device) return;
   state.counts += traced;
-  state.times.push_back({"device", device_ms});  // also where there was nothing to do: ranks sum up step by step
+  add_times(*state.device, device_ms, state.settings.threads, state.times);
   for (const std::size_t tile : tiles) state.costs.push_back({tile, device_ms / static_cast<double>(tiles.size())});
 }
 

@@ -26,11 +26,11 @@ namespace hpr {
 class Communicator;
 class RayScene;
 class RayForwarding;
-class LightDevice;
-struct LightSources;
+class TileShader;
+struct ShadingInputs;
 
-/// Makes what lights by a scene's sources in the CPU's stead, see rt/light_device.h; null where that is to be the CPU.
-using MakeLightDevice = std::function<std::unique_ptr<LightDevice>(const LightSources& sources)>;
+/// Makes what lights by a scene's sources in the CPU's stead, see rt/tile_shader.h; null where that is to be the CPU.
+using MakeTileShader = std::function<std::unique_ptr<TileShader>(const ShadingInputs& sources)>;
 
 /// Layers that shading writes, all of one layout; null where not wanted.
 struct LightOutput {
@@ -77,7 +77,7 @@ class DeferredShader {
   /// collective. Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires
   /// reads every texel once.
   DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {},
-                 RayForwarding* forwarding = nullptr, const MakeLightDevice& make_device = {});
+                 RayForwarding* forwarding = nullptr, const MakeTileShader& make_device = {});
   DeferredShader(const Scene& scene, const RaySettings& settings)
       : DeferredShader(scene, settings, requirements_of(scene)) {}
   ~DeferredShader();

@@ -64,6 +64,7 @@ struct RaySettings {
   bool filter_across_tiles = false;
   PixelFilter filter =
       PixelFilter::Box;    ///< of the pixels, which denoising samples at more places; none of its weights < 0
+  bool on_device = false;  ///< a device lights in the CPU's stead, see TileShader
   bool reference = false;  ///< path tracing in place of all passes, paths of max_depth segments
   std::uint64_t seed = 1;  ///< of all randomness
   int threads = 1;

@@ -24,7 +24,7 @@ ALLOWED = {
     "cluster/transport": ["core"],
     "cluster/distribution": ["core", "image", "scene", "cluster/transport"],
     "raster": ["core", "image", "scene"],
-    "gpu": ["core", "image", "scene", "cluster/transport", "rt"],
+    "gpu": ["core", "image", "scene", "rt"],
     "compositing": ["core", "image", "cluster/transport"],
     "rt": ["core", "image", "scene", "cluster/transport"],
     "walls": ["core", "image", "scene", "cluster/transport"],

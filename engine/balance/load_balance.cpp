@@ -233,7 +233,7 @@ std::string explain_balance(const FramePlan& plan) {
 
 bool lends_light(Session& session, const FramePlan& plan) {
   if (plan.balance != Balance::Demand || session.comm().size() == 1 || session.comm().models_time()) return false;
-  if (plan.shading == Shading::Local || !plan.lit || plan.light_on_device) return false;
+  if (plan.shading == Shading::Local || !plan.lit || plan.rays.on_device) return false;
   return !session.shader(plan.rays).is_whole();
 }
 

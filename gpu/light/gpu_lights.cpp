@@ -57,7 +57,6 @@ GpuLights::GpuLights(const GpuDevice& device, const Scene& scene, const LightSam
   const std::vector<GpuTriangleLight> emitting = triangle_lights_of(scene, triangles);
   root.triangles = tables_.upload(std::span(emitting));
   root.triangles_count = count_of(emitting.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i) has_coated_ = has_coated_ || triangles[i].is_coated;
 
   root.background = {scene.background.r, scene.background.g, scene.background.b};
   if (sampler.environment_map()) {

@@ -20,13 +20,10 @@ class GpuLights {
 
   /// As Lights of lights.glsl.
   [[nodiscard]] std::uint64_t address() const { return address_; }
-  /// Whether some triangle emits through a clear coat, which shaders leave out.
-  [[nodiscard]] bool has_coated() const { return has_coated_; }
 
  private:
   GpuTables tables_;
   std::uint64_t address_ = 0;
-  bool has_coated_ = false;
 };
 
 }  // namespace hpr

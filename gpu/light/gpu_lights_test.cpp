@@ -446,7 +446,6 @@ TEST_F(GpuLightsTest, ScenesAreLitAsOnTheCpu) {
     const LightSampler sampler(scene, all[number].constant);
     const GpuMaterials materials(device(), scene);
     const GpuLights lights(device(), scene, sampler, materials);
-    EXPECT_FALSE(lights.has_coated());
     std::vector<LightQuery> queries(kInputs / all.size());
     for (LightQuery& query : queries) {
       query.position = spread(random, 1e-2, 100.0) * random.direction();
@@ -504,19 +503,6 @@ TEST_F(GpuLightsTest, ScenesAreLitAsOnTheCpu) {
       EXPECT_GT(met, queries.size() / 10) << number;
     }
   }
-}
-
-TEST_F(GpuLightsTest, CoatedTrianglesAreReported) {
-  Scene scene;
-  Material coated = test::glowing({1.0F, 1.0F, 1.0F});
-  auto extensions = std::make_shared<MaterialExtensions>();
-  extensions->clearcoat = 0.5F;
-  coated.extensions = extensions;
-  test::place_mesh(
-      scene, test::add_mesh(scene, test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, test::add_material(scene, coated))));
-  finish_scene(scene);
-  const GpuMaterials materials(device(), scene);
-  EXPECT_TRUE(GpuLights(device(), scene, LightSampler(scene), materials).has_coated());
 }
 
 /// As photon_starts.comp has them.

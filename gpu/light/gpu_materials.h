@@ -19,7 +19,6 @@ class GpuMaterials {
 
   /// As Materials of materials.glsl.
   [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
-  [[nodiscard]] const GpuTextures& textures() const { return textures_; }
 
  private:
   GpuTextures textures_;

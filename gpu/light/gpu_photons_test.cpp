@@ -1,6 +1,6 @@
 #include "gpu/light/gpu_photons.h"
 
-#include <hpr/shaders/photon_light.h>
+#include <hpr/shaders/gathered_photons.h>
 
 #include <algorithm>
 #include <array>
@@ -39,7 +39,7 @@ struct GpuReflectionTerms {
   std::uint32_t specular;
 };
 
-/// As photon_light.comp reads them.
+/// As gathered_photons.comp reads them.
 struct Query {
   glm::dvec3 position;
   glm::dvec3 geometric_normal;
@@ -56,7 +56,7 @@ struct Query {
 };
 static_assert(sizeof(Query) == 232);
 
-/// As photon_light.comp writes them.
+/// As gathered_photons.comp writes them.
 struct Answer {
   glm::dvec3 light;
   std::uint32_t found;
@@ -257,7 +257,7 @@ Compared compare(const GpuDevice& device, const LitRoom& room, const PhotonMaps&
     queries.push_back(each.query());
   }
   const std::vector<Answer> answers =
-      test::map_on_gpu<Answer>(device, photon_light, std::span<const Query>(queries), photons.address());
+      test::map_on_gpu<Answer>(device, gathered_photons, std::span<const Query>(queries), photons.address());
   Compared compared;
   for (std::size_t i = 0; i < count; ++i) {
     const Answer expected = expected_answer(room, maps, all[i]);
@@ -337,7 +337,7 @@ TEST_F(GpuPhotonsTest, AreAllFoundOrTheDeviceIsKnownToHaveGivenUp) {
   photons.put(maps);
   const Query query = gather.query();
   const auto answers =
-      test::map_on_gpu<Answer>(device(), photon_light, std::span<const Query>(&query, 1), photons.address());
+      test::map_on_gpu<Answer>(device(), gathered_photons, std::span<const Query>(&query, 1), photons.address());
   const glm::dvec3 expected = light_by_pass(room, maps, gather);
   ASSERT_GT(brightness(expected), 0.0);
   if (answers[0].done == 0) {

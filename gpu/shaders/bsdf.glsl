@@ -19,17 +19,6 @@ dvec3 bsdf_lobe(Bsdf b, uint lobe, dvec3 to_light, out double pdf) {
   return plain_lobe(b.plain, lobe, to_light, pdf);
 }
 
-dvec3 bsdf_value(Bsdf b, uint lobe, dvec3 to_light) {
-  double pdf;
-  return bsdf_lobe(b, lobe, to_light, pdf);
-}
-
-double bsdf_pdf(Bsdf b, uint lobe, dvec3 to_light) {
-  double pdf;
-  bsdf_lobe(b, lobe, to_light, pdf);
-  return pdf;
-}
-
 // f and density of every lobe.
 Scattering bsdf_scattering(Bsdf b, dvec3 to_light) {
   if (!is_extended(b)) return plain_scattering(b.plain, to_light);
@@ -55,11 +44,6 @@ dvec3 bsdf_sum(Bsdf b, uint lobes, dvec3 to_light) {
     if (((lobes >> i) & 1u) != 0u) sum += extended_lobe(b, i, to_light, pdf);
   }
   return sum;
-}
-
-// The sum over Diffuse and Reflection, a coat among that, or one of them.
-dvec3 bsdf_reflected(Bsdf b, dvec3 to_light, bool diffuse, bool specular) {
-  return bsdf_sum(b, (diffuse ? 1u << kDiffuse : 0u) | (specular ? (1u << kReflection) | (1u << kCoat) : 0u), to_light);
 }
 
 // f of all lobes.

@@ -21,20 +21,21 @@
 
 uint occlusion_rays = 0u;
 
-// AmbientOcclusionPass.
+const uint kOcclusionBranch = 16u;  // AmbientOcclusionPass::kBranch
+
 dvec3 ambient_light(PathVertex point) {
   dvec3 sum = dvec3(0.0lf);
   uint count = work.occlusion_rays;
   if (count == 0u || bsdf_weight(point.bsdf, kDiffuse) == dvec3(0.0lf)) return sum;
-  Sampler random = branch_of(point.random, 16u);
+  Sampler random = branch_of(point.random, kOcclusionBranch);
   for (uint i = 0u; i < count; ++i) {
-    BsdfSample way;
-    if (!bsdf_sample(point.bsdf, kDiffuse, next_two(random, 1u), way)) continue;
-    TracedRay ray = TracedRay(ray_origin(point.surface, way.direction) + point.surface.lift, way.direction,
+    BsdfSample bounce;
+    if (!bsdf_sample(point.bsdf, kDiffuse, next_two(random, 1u), bounce)) continue;
+    TracedRay ray = TracedRay(ray_origin(point.surface, bounce.direction) + point.surface.lift, bounce.direction,
                               work.occlusion_reach, true);
     ++occlusion_rays;
     if (is_blocked(work.scene.tree, ray)) continue;
-    sum += point.throughput * way.weight * (point.material.occlusion * work.ambient / double(count));
+    sum += point.throughput * bounce.weight * (point.material.occlusion * work.ambient / double(count));
   }
   return sum;
 }

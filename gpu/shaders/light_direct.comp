@@ -25,11 +25,6 @@
 #include "trace.glsl"
 #include "light_state.glsl"
 
-double balance(double pdf, double light_pdf) {
-  if (!(pdf > 0.0lf)) return 1.0lf;
-  return pdf / (pdf + light_pdf * double(work.light_samples));
-}
-
 uint shadow_rays = 0u;
 
 dvec3 emitted_light(PathVertex point, FoundVertex found) {
@@ -120,7 +115,7 @@ void shade() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
   PathVertex point = work.states.states[pixel_index].vertex;
   // Where it waited, until others do.
-  FoundVertex found = work.waiting.found[pixel_index * kMaxWaiting + work.states.states[pixel_index].waiting];
+  FoundVertex found = work.waiting.found[pixel_index * work.max_waiting + work.states.states[pixel_index].waiting];
   dvec3 sum = emitted_light(point, found);
   sum += direct_light(work.views.views[tile_of_pixel().view], point);
   work.states.states[pixel_index].sum += sum;

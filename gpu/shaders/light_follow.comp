@@ -25,11 +25,6 @@
 #include "trace.glsl"
 #include "light_state.glsl"
 
-double balance(double pdf, double light_pdf) {
-  if (!(pdf > 0.0lf)) return 1.0lf;
-  return pdf / (pdf + light_pdf * double(work.light_samples));
-}
-
 uint reflection_rays = 0u;
 uint refraction_rays = 0u;
 uint waiting_count = 0u;
@@ -38,9 +33,9 @@ bool is_cut_off = false;
 // Follows a lobe by a ray: returns the sky's light that it finds; the surface that it meets waits.
 dvec3 follow(PathVertex point, Bsdf bsdf, uint lobe) {
   Sampler random = branch_of(point.random, lobe);
-  BsdfSample way;
-  if (!bsdf_sample(bsdf, lobe, next_two(random, point.depth), way)) return dvec3(0.0lf);
-  dvec3 throughput = point.lobe_weights[lobe] * point.throughput * way.weight;
+  BsdfSample bounce;
+  if (!bsdf_sample(bsdf, lobe, next_two(random, point.depth), bounce)) return dvec3(0.0lf);
+  dvec3 throughput = point.lobe_weights[lobe] * point.throughput * bounce.weight;
   throughput *= roulette_weight(largest(throughput), random);
   if (throughput == dvec3(0.0lf)) return dvec3(0.0lf);
   if (lobe == kTransmission || lobe == kDiffuseTransmission) {
@@ -49,26 +44,26 @@ dvec3 follow(PathVertex point, Bsdf bsdf, uint lobe) {
     ++reflection_rays;
   }
   FoundVertex next;
-  next.origin = ray_origin(point.surface, way.direction);
-  next.direction = way.direction;
-  bool meets_backs = leads_into_solid(point.surface, point.material, way.direction);
+  next.origin = ray_origin(point.surface, bounce.direction);
+  next.direction = bounce.direction;
+  bool meets_backs = leads_into_solid(point.surface, point.material, bounce.direction);
   next.surface = closest_surface(work.scene.tree, TracedRay(next.origin, next.direction, kInfinity, meets_backs));
   if (next.surface == kNoSurface) {
     Lights lights = Lights(work.lights);
-    double light_pdf = way.pdf > 0.0lf ? environment_pdf(lights, point.surface.position,
-                                                         bsdf_light_normal(point.bsdf), way.direction)
+    double light_pdf = bounce.pdf > 0.0lf ? environment_pdf(lights, point.surface.position,
+                                                         bsdf_light_normal(point.bsdf), bounce.direction)
                                        : 0.0lf;
-    return balance(way.pdf, light_pdf) * throughput * environment_radiance(lights, way.direction);
+    return balance(bounce.pdf, light_pdf) * throughput * environment_radiance(lights, bounce.direction);
   }
   next.throughput = throughput;
-  next.media = media_towards(point.media, point.surface, point.material, way.direction);
+  next.media = media_towards(point.media, point.surface, point.material, bounce.direction);
   next.previous_position = point.surface.position;
   next.previous_normal = bsdf_light_normal(point.bsdf);
-  next.previous_pdf = way.pdf;
+  next.previous_pdf = bounce.pdf;
   next.random = random;
   next.depth = point.depth + 1u;
-  if (waiting_count < kMaxWaiting) {
-    work.waiting.found[pixel_index * kMaxWaiting + waiting_count++] = next;
+  if (waiting_count < work.max_waiting) {
+    work.waiting.found[pixel_index * work.max_waiting + waiting_count++] = next;
   } else {
     is_cut_off = true;
   }

@@ -26,8 +26,8 @@
 
 void main() {
   if (!start_pixel()) return;
-  LitTile tile = tile_of_pixel();
-  uvec2 place = place_in_tile();
+  ShadedTile tile = tile_of_pixel();
+  uvec2 place = pixel_in_tile();
   work.states.states[pixel_index].sum = dvec3(0.0lf);
   work.states.states[pixel_index].waiting = 0u;
   work.states.states[pixel_index].is_cut_off = 0u;
@@ -54,7 +54,7 @@ void main() {
   first.random = make_sampler(pixel_stream(work.random_frame, view.screen_number, view.block + ivec2(at)), work.sample_index);
   first.surface = ~uint(key);
   first.depth = 0u;
-  work.waiting.found[pixel_index * kMaxWaiting] = first;
+  work.waiting.found[pixel_index * work.max_waiting] = first;
   work.states.states[pixel_index].waiting = 1u;
   work.states.states[pixel_index].covered = 1u;
 }

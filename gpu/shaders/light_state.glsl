@@ -3,19 +3,19 @@
 // pixel's light is added up in one order, whatever is lit beside it.
 // Needs all that makes points of surfaces, materials, BSDFs and views, and path.glsl.
 
-struct LitTile {
+struct ShadedTile {
   ivec2 corner;  // on the view's block
   uvec2 size;
   uint view;
   uint padding;
 };
-layout(buffer_reference, scalar) readonly buffer LitTiles {
-  LitTile tiles[];
+layout(buffer_reference, scalar) readonly buffer ShadedTiles {
+  ShadedTile tiles[];
 };
 layout(buffer_reference, scalar) readonly buffer Keys {
   uint64_t keys[];
 };
-layout(buffer_reference, scalar) writeonly buffer LitPixels {
+layout(buffer_reference, scalar) writeonly buffer ShadedPixels {
   vec4 pixels[];  // radiance, and the share that surfaces cover
 };
 layout(buffer_reference, scalar) readonly buffer ViewList {
@@ -43,8 +43,6 @@ layout(buffer_reference, scalar) buffer PixelStates {
 layout(buffer_reference, scalar) buffer WaitingVertices {
   FoundVertex found[];
 };
-// Two surfaces that a path begins with may split into all lobes and channels, what comes after does not.
-const uint kMaxWaiting = 12u;
 
 struct LightInput {
   SceneTrees scene;
@@ -52,9 +50,9 @@ struct LightInput {
   Materials materials;
   uint64_t lights;
   uint64_t photons;  // null: none
-  LitTiles tiles;
+  ShadedTiles tiles;
   Keys keys;
-  LitPixels pixels;
+  ShadedPixels pixels;
   PixelStates states;
   WaitingVertices waiting;
   ViewList views;
@@ -71,6 +69,8 @@ struct LightInput {
   uint occlusion_rays;
   uint shadows;
   uint terminator_fix;
+  uint max_waiting;  // vertices of a pixel
+  uint padding;
 };
 layout(buffer_reference, scalar) readonly buffer LightInputs {
   LightInput light;
@@ -104,11 +104,17 @@ bool start_pixel() {
   return true;
 }
 
-LitTile tile_of_pixel() {
+// The fraction of light found along a ray of density `pdf` that is left to it where sampling lights finds it too.
+double balance(double pdf, double light_pdf) {
+  if (!(pdf > 0.0lf)) return 1.0lf;
+  return pdf / (pdf + light_pdf * double(work.light_samples));
+}
+
+ShadedTile tile_of_pixel() {
   return work.tiles.tiles[pixel_index / kTilePixels];
 }
 
-uvec2 place_in_tile() {
+uvec2 pixel_in_tile() {
   return uvec2(pixel_index % kTileSide, pixel_index / kTileSide % kTileSide);
 }
 

@@ -23,7 +23,7 @@ void main() {
   uint waiting = work.states.states[pixel_index].waiting;
   work.states.states[pixel_index].is_shading = waiting > 0u ? 1u : 0u;
   if (waiting == 0u) return;
-  FoundVertex found = work.waiting.found[pixel_index * kMaxWaiting + waiting - 1u];
+  FoundVertex found = work.waiting.found[pixel_index * work.max_waiting + waiting - 1u];
   work.states.states[pixel_index].vertex = make_vertex(work.surfaces.table, work.materials, work.limits, found);
   work.states.states[pixel_index].waiting = waiting - 1u;
   note_cut_off(false);

@@ -71,7 +71,7 @@ bool splits_channels(PathVertex point) {
 void choose_followed(PathLimits limits, inout PathVertex point) {
   double bright[kLobes];
   double sum = 0.0lf;
-  uint ways = 0u;
+  uint choices = 0u;
   for (uint lobe = 0u; lobe < kLobes; ++lobe) {
     point.lobe_weights[lobe] = 0.0lf;
     point.may_follow[lobe] = false;
@@ -84,9 +84,9 @@ void choose_followed(PathLimits limits, inout PathVertex point) {
     point.may_follow[lobe] = bright[lobe] > 0.0lf;
     point.lobe_weights[lobe] = in_single(roulette_weight(bright[lobe], point.random));
     sum += bright[lobe];
-    ways += point.may_follow[lobe] ? 1u : 0u;
+    choices += point.may_follow[lobe] ? 1u : 0u;
   }
-  if (point.depth < kChoosingDepth || ways < 2u) return;
+  if (point.depth < kChoosingDepth || choices < 2u) return;
   if (!is_extended(point.bsdf)) {
     double fraction = clamp(bright[kReflection] / (bright[kReflection] + bright[kTransmission]), 0.1lf, 0.9lf);
     bool reflects = next_one(point.random) < fraction;

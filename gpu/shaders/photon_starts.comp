@@ -1,4 +1,4 @@
-// A test's: photons of light_photons.glsl.
+// A test's: photons of photon_emission.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "threads.glsl"
@@ -25,7 +25,7 @@
 
 #include "lights.glsl"
 
-#include "light_photons.glsl"
+#include "photon_emission.glsl"
 
 struct Query {
   double choice;

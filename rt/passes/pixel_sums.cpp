@@ -132,8 +132,8 @@ void PixelSums::store(const TileJob& job, std::size_t tile, const LightOutput& o
   }
 }
 
-void store_lit(const TileJob& job, std::size_t tile, std::span<const glm::vec4> pixels, const LightOutput& output,
-               RayCounts& counts) {
+void store_shaded(const TileJob& job, std::size_t tile, std::span<const glm::vec4> pixels, const LightOutput& output,
+                  RayCounts& counts) {
   const std::span<Rgb> colors = cleared(job, tile, *output.radiance);
   each_lit(job, [&](std::size_t i) {
     const Rgb color{pixels[i].r, pixels[i].g, pixels[i].b};

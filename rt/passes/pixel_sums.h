@@ -87,9 +87,9 @@ class PixelSums {
   }
 };
 
-/// Stores a sample's pixels that a device has lit (LightDevice), as PixelSums does: of the job's rows of tile `tile`.
-void store_lit(const TileJob& job, std::size_t tile, std::span<const glm::vec4> pixels, const LightOutput& output,
-               RayCounts& counts);
+/// Stores a sample's pixels that a device has lit (TileShader), as PixelSums does: of the job's rows of tile `tile`.
+void store_shaded(const TileJob& job, std::size_t tile, std::span<const glm::vec4> pixels, const LightOutput& output,
+                  RayCounts& counts);
 
 /// Whether a pixel of floats can hold the light; what does not fit is stored as black.
 [[nodiscard]] bool fits_floats(const glm::dvec3& light);

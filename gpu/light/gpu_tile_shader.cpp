@@ -1,5 +1,6 @@
-#include "gpu/light/gpu_light.h"
+#include "gpu/light/gpu_tile_shader.h"
 
+#include <fmt/format.h>
 #include <hpr/shaders/light_ambient.h>
 #include <hpr/shaders/light_ambient_plain.h>
 #include <hpr/shaders/light_direct.h>
@@ -19,8 +20,11 @@
 #include <array>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
+#include <string_view>
 
 #include "core/error.h"
+#include "core/job_board.h"
 #include "gpu/gpu_view.h"
 #include "rt/passes/pass.h"
 #include "rt/passes/path_vertex.h"
@@ -28,6 +32,10 @@
 
 namespace hpr {
 namespace {
+
+/// Vertices of a pixel that may wait: two surfaces that a path begins with may split into all lobes and channels, what
+/// comes after does not.
+constexpr std::uint32_t kMaxWaiting = 12;
 
 /// As in light_state.glsl.
 struct GpuTile {
@@ -68,8 +76,10 @@ struct GpuLightInput {
   std::uint32_t occlusion_rays = 0;
   std::uint32_t shadows = 0;
   std::uint32_t terminator_fix = 0;
+  std::uint32_t max_waiting = kMaxWaiting;
+  std::uint32_t padding = 0;
 };
-static_assert(sizeof(GpuLightInput) == 192);
+static_assert(sizeof(GpuLightInput) == 200);
 
 struct Constants {
   std::uint64_t input;
@@ -81,33 +91,37 @@ struct Constants {
 constexpr std::array kCountedPasses{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion};
 
 constexpr std::size_t kCounters = kCountedPasses.size() + 1;
-constexpr std::size_t kMaxWaiting = 12;
 
 /// Lit at once: a batch has a time limit, and each pixel has kilobytes of memory while it is lit.
 constexpr std::size_t kSoftwareTiles = 4;
 constexpr std::size_t kTiles = 32;
 /// Vertices of each pixel that are shaded before the CPU asks whether all is done.
 constexpr int kRounds = 2;
+constexpr int kMaxLightSamples = 64;
 
-/// The kernels' shaders: for scenes with extensions of materials, or without any.
-struct Shaders {
-  std::span<const std::uint32_t> start;
-  std::span<const std::uint32_t> vertex;
-  std::span<const std::uint32_t> direct;
-  std::span<const std::uint32_t> ambient;
-  std::span<const std::uint32_t> photons;
-  std::span<const std::uint32_t> follow;
-  std::span<const std::uint32_t> finish;
+/// The steps of light, in the order of a vertex.
+enum Step : std::size_t { Start, Vertex, Direct, Ambient, Photons, Follow, Finish };
+
+struct StepInfo {
+  std::string_view name;
+  std::span<const std::uint32_t> shader;
+  std::span<const std::uint32_t> plain_shader;  ///< for scenes without extensions of materials
+  std::optional<PassId> pass = {};              ///< runs only where this one does
 };
 
-Shaders shaders_for(const Scene& scene) {
-  const bool extended =
-      std::ranges::any_of(scene.materials, [](const Material& material) { return material.extensions != nullptr; });
-  if (extended) {
-    return {light_start, light_vertex, light_direct, light_ambient, light_photons, light_follow, light_finish};
-  }
-  return {light_start_plain,   light_vertex_plain, light_direct_plain, light_ambient_plain,
-          light_photons_plain, light_follow_plain, light_finish_plain};
+/// By step.
+std::array<StepInfo, 7> steps() {
+  return {{{"device start", light_start, light_start_plain},
+           {"device vertex", light_vertex, light_vertex_plain},
+           {"device direct", light_direct, light_direct_plain},
+           {"device ambient", light_ambient, light_ambient_plain, PassId::AmbientOcclusion},
+           {"device photons", light_photons, light_photons_plain, PassId::Photon},
+           {"device follow", light_follow, light_follow_plain},
+           {"device finish", light_finish, light_finish_plain}}};
+}
+
+bool has_extensions(const Scene& scene) {
+  return std::ranges::any_of(scene.materials, [](const Material& material) { return material.extensions != nullptr; });
 }
 
 /// A tile that was not finished covers so little, see kUnfinished in light_state.glsl.
@@ -115,7 +129,7 @@ bool is_finished(std::span<const glm::vec4> pixels) {
   return std::ranges::none_of(pixels, [](const glm::vec4& pixel) { return pixel.a < 0.0F; });
 }
 
-GpuPathLimits limits_of(const LightSources& sources) {
+GpuPathLimits limits_of(const ShadingInputs& sources) {
   GpuPathLimits limits{.glossy_cutoff = sources.settings.glossy_cutoff,
                        .max_depth = static_cast<std::uint32_t>(sources.settings.max_depth)};
   for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
@@ -143,12 +157,15 @@ std::string refusal_of_light(const Scene& scene, const RaySettings& settings, st
   if (!settings.half_resolution.empty()) return "passes at half resolution are the CPU's";
   if (settings.part) return "rays travel between ranks";
   if (runs_pass(plan, PassId::Gather)) return "gathering by rays is the CPU's";
+  if (settings.light_samples > kMaxLightSamples) {
+    return fmt::format("more than {} light samples are the CPU's", kMaxLightSamples);  // a batch has a time limit
+  }
   if (has_coverage(scene)) return "surfaces that cover in part are the CPU's";
   if (std::ranges::any_of(scene.materials, emits_through_coat)) return "emission through clear coats is the CPU's";
   return {};
 }
 
-GpuLight::GpuLight(const GpuDevice& device, const LightSources& sources, int threads)
+GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& sources, int threads)
     : device_(device),
       sources_(sources),
       scene_(device, sources.scene, std::array{SurfaceRange{0, sources.scene.triangles}}, threads),
@@ -156,30 +173,27 @@ GpuLight::GpuLight(const GpuDevice& device, const LightSources& sources, int thr
       materials_(device, sources.scene),
       lights_(device, sources.scene, sources.lights, materials_),
       photons_(device),
-      start_(device, shaders_for(sources.scene).start, sizeof(Constants)),
-      vertex_(device, shaders_for(sources.scene).vertex, sizeof(Constants)),
-      direct_(device, shaders_for(sources.scene).direct, sizeof(Constants)),
-      follow_(device, shaders_for(sources.scene).follow, sizeof(Constants)),
-      finish_(device, shaders_for(sources.scene).finish, sizeof(Constants)),
       input_(device, sizeof(GpuLightInput), GpuMemory::Upload),
       counters_(device, kCounters * sizeof(std::uint32_t), GpuMemory::Readback),
       batch_(device) {
-  const Shaders shaders = shaders_for(sources.scene);
-  state_bytes_ = array_stride(shaders.vertex, "PixelState");
-  waiting_bytes_ = kMaxWaiting * array_stride(shaders.vertex, "FoundVertex");
-  if (runs_pass(sources.plan, PassId::AmbientOcclusion)) ambient_.emplace(device, shaders.ambient, sizeof(Constants));
-  if (runs_pass(sources.plan, PassId::Photon)) photon_.emplace(device, shaders.photons, sizeof(Constants));
+  const bool extended = has_extensions(sources.scene);
+  for (const StepInfo& step : steps()) {
+    const auto shader = extended ? step.shader : step.plain_shader;
+    const bool runs = !step.pass || runs_pass(sources.plan, *step.pass);
+    kernels_.push_back(runs ? std::make_unique<GpuKernel>(device, shader, sizeof(Constants)) : nullptr);
+    times_.push_back({std::string(step.name), 0.0, step.pass});
+  }
+  const auto layout = extended ? steps()[Vertex].shader : steps()[Vertex].plain_shader;
+  state_bytes_ = array_stride(layout, "PixelState");
+  waiting_bytes_ = kMaxWaiting * array_stride(layout, "FoundVertex");
   compile();
 }
 
 /// Software devices compile a kernel when it runs first, which takes seconds: each for itself, as waits have a limit.
-void GpuLight::compile() {
+void GpuTileShader::compile() {
   if (!device_.info().software) return;
-  std::vector<const GpuKernel*> kernels{&start_, &vertex_, &direct_, &follow_, &finish_};
-  for (const auto* optional : {&ambient_, &photon_}) {
-    if (*optional) kernels.push_back(&**optional);
-  }
-  for (const GpuKernel* kernel : kernels) {
+  for (const auto& kernel : kernels_) {
+    if (!kernel) continue;
     batch_.run(*kernel, 1, Constants{input_.address(), 0, 0});
     batch_.submit();
     batch_.wait();
@@ -187,7 +201,7 @@ void GpuLight::compile() {
 }
 
 /// Memory for so many tiles that are lit at once.
-void GpuLight::grow(std::size_t tiles, std::size_t views) {
+void GpuTileShader::grow(std::size_t tiles, std::size_t views) {
   grow_to(device_, views_, views * sizeof(GpuView), GpuMemory::Upload);
   grow_to(device_, eye_media_, views * sizeof(Media), GpuMemory::Upload);
   grow_to(device_, tiles_, tiles * sizeof(GpuTile), GpuMemory::Upload);
@@ -198,9 +212,14 @@ void GpuLight::grow(std::size_t tiles, std::size_t views) {
   grow_to(device_, read_, tiles * kTilePixels * sizeof(glm::vec4), GpuMemory::Readback);
 }
 
-void GpuLight::shade(const DeviceTiles& lit, RayCounts& counts, const Store& store) {
+void GpuTileShader::shade(const TilesToShade& lit, RayCounts& counts, const Store& store) {
   const std::size_t most = device_.info().software ? kSoftwareTiles : kTiles;
-  if (lit.photons != nullptr) photons_.put(*lit.photons);
+  for (PassTime& step : times_) step.ms = 0.0;
+  if (lit.tiles.empty()) return;
+  if (lit.photons != nullptr && held_photons_ != lit.samples.front().number) {
+    photons_.put(*lit.photons);
+    held_photons_ = lit.samples.front().number;
+  }
   for (const ShadedSample& sample : lit.samples) {
     for (std::size_t first = 0; first < lit.tiles.size(); first += most) {
       if (lit.is_overtaken && lit.is_overtaken()) return;
@@ -209,32 +228,48 @@ void GpuLight::shade(const DeviceTiles& lit, RayCounts& counts, const Store& sto
   }
 }
 
-/// Shades vertex after vertex of all pixels' paths, until none waits, and reads what they add up to.
-void GpuLight::follow_paths(std::size_t tiles, bool gathers_photons) {
-  const std::size_t pixels = tiles * kTilePixels;
-  const Constants constants{input_.address(), static_cast<std::uint32_t>(tiles), 0};
-  std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kCountedPasses.size()];
-  batch_.run(start_, pixels, constants);
-  do {
-    waiting = 0;
-    for (int round = 0; round < kRounds; ++round) {
-      batch_.run(vertex_, pixels, constants);
-      batch_.run(direct_, pixels, constants);
-      if (ambient_) batch_.run(*ambient_, pixels, constants);
-      if (photon_ && gathers_photons) batch_.run(*photon_, pixels, constants);
-      batch_.run(follow_, pixels, constants);
-    }
-    batch_.submit();
-    batch_.wait();
-  } while (waiting > 0);
-  batch_.run(finish_, pixels, constants);
-  batch_.copy(*pixels_, *read_, pixels * sizeof(glm::vec4));
-  batch_.submit();
-  batch_.wait();
+/// Where its pass runs.
+void GpuTileShader::run_step(std::size_t step, std::size_t tiles) {
+  if (!kernels_[step]) return;
+  batch_.begin_pass(times_[step].name);
+  batch_.run(*kernels_[step], tiles * kTilePixels, Constants{input_.address(), static_cast<std::uint32_t>(tiles), 0});
 }
 
-void GpuLight::shade_some(const DeviceTiles& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
-                          RayCounts& counts, const Store& store) {
+void GpuTileShader::finish_batch() {
+  batch_.submit();
+  batch_.wait();
+  report_step();
+  for (const GpuPassTime& time : batch_.times()) {
+    const auto step = std::ranges::find(times_, time.pass, &PassTime::name);
+    if (step != times_.end()) step->ms += time.ms;
+  }
+}
+
+/// Shades vertex after vertex of all pixels' paths, until none waits, and reads what they add up to; false where that
+/// was overtaken.
+bool GpuTileShader::follow_paths(std::size_t tiles, const TilesToShade& lit) {
+  std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kCountedPasses.size()];
+  run_step(Start, tiles);
+  do {
+    if (lit.is_overtaken && lit.is_overtaken()) return false;
+    waiting = 0;
+    for (int round = 0; round < kRounds; ++round) {
+      run_step(Vertex, tiles);
+      run_step(Direct, tiles);
+      run_step(Ambient, tiles);
+      if (lit.photons != nullptr) run_step(Photons, tiles);
+      run_step(Follow, tiles);
+    }
+    finish_batch();
+  } while (waiting > 0);
+  run_step(Finish, tiles);
+  batch_.copy(*pixels_, *read_, tiles * kTilePixels * sizeof(glm::vec4));
+  finish_batch();
+  return true;
+}
+
+void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
+                               RayCounts& counts, const Store& store) {
   const FrameLayout& layout = sample.keys->layout();
   const RaySettings& settings = sources_.settings;
   grow(tiles.size(), sample.views.size());
@@ -248,7 +283,12 @@ void GpuLight::shade_some(const DeviceTiles& lit, const ShadedSample& sample, st
                                     {location.pixels.width(), location.pixels.height()},
                                     static_cast<std::uint32_t>(location.screen),
                                     static_cast<std::uint32_t>(i)};
-    std::ranges::copy(sample.keys->tile(tiles[i]), keys_->mapped<Key>().subspan(i * kTilePixels).begin());
+    const std::span<Key> keys = keys_->mapped<Key>().subspan(i * kTilePixels, kTilePixels);
+    std::ranges::copy(sample.keys->tile(tiles[i]), keys.begin());
+    const std::span<const std::uint8_t> wanted = mask_of(sample.wanted, tiles[i]);
+    for (std::size_t pixel = 0; pixel < wanted.size(); ++pixel) {
+      if (wanted[pixel] == 0) keys[pixel] = kNoKey;  // nothing of it is stored
+    }
   }
   GpuLightInput input{.scene = scene_.address(),
                       .surfaces = surfaces_.address(),
@@ -280,7 +320,7 @@ void GpuLight::shade_some(const DeviceTiles& lit, const ShadedSample& sample, st
   input_.mapped<GpuLightInput>()[0] = input;
   std::ranges::fill(counters_.mapped<std::uint32_t>(), 0U);
 
-  follow_paths(tiles.size(), lit.photons != nullptr);
+  if (!follow_paths(tiles.size(), lit)) return;
 
   const std::span<const glm::vec4> pixels = read_->mapped<const glm::vec4>();
   for (std::size_t i = 0; i < tiles.size(); ++i) {

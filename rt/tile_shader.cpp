@@ -1,4 +1,4 @@
-#include "rt/light_device.h"
+#include "rt/tile_shader.h"
 
 #include <algorithm>
 #include <set>
@@ -18,7 +18,7 @@ bool wants_light_alone(const LightOutput& output) {
 
 }  // namespace
 
-std::vector<std::size_t> light_on_device(LightDevice* device, const DeviceTiles& lit, RayCounts& traced) {
+std::vector<std::size_t> shade_on_device(TileShader* device, const TilesToShade& lit, RayCounts& traced) {
   if (device == nullptr || !wants_light_alone(lit.samples.front().output)) return {lit.tiles.begin(), lit.tiles.end()};
   const trace::Span span("light, on the device");
   std::set<std::size_t> unfinished;
@@ -35,9 +35,18 @@ std::vector<std::size_t> light_on_device(LightDevice* device, const DeviceTiles&
                       &sample.views[location.screen],
                       0,
                       mask_of(sample.wanted, tile)};
-    store_lit(job, tile, pixels, sample.output, traced);
+    store_shaded(job, tile, pixels, sample.output, traced);
   });
   return {unfinished.begin(), unfinished.end()};
+}
+
+void add_times(const TileShader& device, double ms, int threads, std::vector<PassTime>& times) {
+  double rest = ms;
+  for (const PassTime& step : device.times()) {
+    times.push_back({step.name, step.ms * threads});
+    rest -= times.back().ms;
+  }
+  times.push_back({"device rest", std::max(rest, 0.0)});
 }
 
 }  // namespace hpr

@@ -12,6 +12,7 @@
 #include "rt/materials/bsdf.h"
 #include "rt/materials/medium.h"
 #include "rt/passes/pass_list.h"
+#include "rt/ray_counts.h"
 #include "rt/ray_settings.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
@@ -22,7 +23,7 @@ struct PhotonMaps;
 
 /// What light is computed from, on whatever device: a scene, its tables, and what is to be done. As long as the shader
 /// that has it lives, it stays as it is.
-struct LightSources {
+struct ShadingInputs {
   const Scene& scene;
   const Surfaces& surfaces;
   const LightSampler& lights;
@@ -32,7 +33,7 @@ struct LightSources {
 };
 
 /// Tiles of some samples that a device is to light.
-struct DeviceTiles {
+struct TilesToShade {
   std::span<const ShadedSample> samples;
   std::span<const std::size_t> tiles;
   std::span<const Media> eyes;                ///< what the eye of each view is in
@@ -41,21 +42,27 @@ struct DeviceTiles {
 };
 
 /// Lights tiles in the CPU's stead.
-class LightDevice {
+class TileShader {
  public:
-  LightDevice() = default;
-  virtual ~LightDevice() = default;
-  LightDevice(const LightDevice&) = delete;
-  LightDevice& operator=(const LightDevice&) = delete;
+  TileShader() = default;
+  virtual ~TileShader() = default;
+  TileShader(const TileShader&) = delete;
+  TileShader& operator=(const TileShader&) = delete;
 
   /// Called with each tile of a sample: kTilePixels of radiance with the share that surfaces cover; none where the
   /// device could not finish it.
   using Store = std::function<void(const ShadedSample& sample, std::size_t tile, std::span<const glm::vec4> pixels)>;
-  virtual void shade(const DeviceTiles& lit, RayCounts& counts, const Store& store) = 0;
+  virtual void shade(const TilesToShade& lit, RayCounts& counts, const Store& store) = 0;
+
+  /// How long the device was at the steps of the last shade(); the same steps on all ranks, whatever they lit.
+  [[nodiscard]] virtual std::span<const PassTime> times() const = 0;
 };
 
 /// Lights what the device can, null: nothing, and adds the rays it traced. Returns the tiles that are left to the CPU,
 /// of all samples.
-[[nodiscard]] std::vector<std::size_t> light_on_device(LightDevice* device, const DeviceTiles& lit, RayCounts& traced);
+[[nodiscard]] std::vector<std::size_t> shade_on_device(TileShader* device, const TilesToShade& lit, RayCounts& traced);
+
+/// Adds the steps of the device's last shade(), of which everything took so many ms: those of threads, all together.
+void add_times(const TileShader& device, double ms, int threads, std::vector<PassTime>& times);
 
 }  // namespace hpr

@@ -17,43 +17,42 @@
 #include "gpu/light/gpu_materials.h"
 #include "gpu/light/gpu_photons.h"
 #include "gpu/light/gpu_surfaces.h"
-#include "rt/light_device.h"
+#include "rt/tile_shader.h"
 
 namespace hpr {
 
 /// Lights tiles on a device: what DeferredShader does, one thread a pixel (gpu/shaders/light_*.comp). Equal keys get
 /// equal light on devices of one kind, whatever tiles are lit together; that of the CPU differs by rounding.
-class GpuLight final : public LightDevice {
+class GpuTileShader final : public TileShader {
  public:
   /// Puts what `sources` have on the device. Both must outlive this. `threads` build trees. Throws Error (Limit) where
   /// the device's memory ends.
-  GpuLight(const GpuDevice& device, const LightSources& sources, int threads);
+  GpuTileShader(const GpuDevice& device, const ShadingInputs& sources, int threads);
 
-  void shade(const DeviceTiles& lit, RayCounts& counts, const Store& store) override;
+  void shade(const TilesToShade& lit, RayCounts& counts, const Store& store) override;
+  [[nodiscard]] std::span<const PassTime> times() const override { return times_; }
 
  private:
   void compile();
+  void run_step(std::size_t step, std::size_t tiles);
+  void finish_batch();
   void grow(std::size_t tiles, std::size_t views);
-  void follow_paths(std::size_t tiles, bool gathers_photons);
-  void shade_some(const DeviceTiles& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
+  [[nodiscard]] bool follow_paths(std::size_t tiles, const TilesToShade& lit);
+  void shade_some(const TilesToShade& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
                   RayCounts& counts, const Store& store);
 
   const GpuDevice& device_;
-  LightSources sources_;
+  ShadingInputs sources_;
   GpuScene scene_;
   GpuSurfaces surfaces_;
   GpuMaterials materials_;
   GpuLights lights_;
   GpuPhotons photons_;
-  GpuKernel start_;
-  GpuKernel vertex_;
-  GpuKernel direct_;
-  GpuKernel follow_;
-  GpuKernel finish_;
-  std::optional<GpuKernel> ambient_;  ///< where the pass runs
-  std::optional<GpuKernel> photon_;
-  std::size_t state_bytes_ = 0;    ///< of a pixel while it is lit
-  std::size_t waiting_bytes_ = 0;  ///< of the vertices that may wait for it
+  std::optional<SampleNumber> held_photons_ = {};    ///< the sample whose photons those are
+  std::vector<std::unique_ptr<GpuKernel>> kernels_;  ///< by step; null where its pass does not run
+  std::vector<PassTime> times_;                      ///< by step
+  std::size_t state_bytes_ = 0;                      ///< of a pixel while it is lit
+  std::size_t waiting_bytes_ = 0;                    ///< of the vertices that may wait for it
   GpuBuffer input_;
   GpuBuffer counters_;
   std::optional<GpuBuffer> views_;

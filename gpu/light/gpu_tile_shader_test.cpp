@@ -1,4 +1,4 @@
-#include "gpu/light/gpu_light.h"
+#include "gpu/light/gpu_tile_shader.h"
 
 #include <algorithm>
 #include <array>
@@ -36,9 +36,10 @@ struct Lit {
   std::vector<Rgb> pixels;
   std::vector<float> coverage;
   RayCounts counts;
+  double by_cpu_ms = 0.0;  ///< direct light that the CPU computed
 };
 
-class GpuLightTest : public test::OnGpu {
+class GpuTileShaderTest : public test::OnGpu {
  protected:
   Lit light(const Scene& scene, const RaySettings& settings, const View& view, bool by_device,
             const SampleNumber& number = {3, 5}) {
@@ -48,9 +49,9 @@ class GpuLightTest : public test::OnGpu {
     TileLayer<Key> keys(layout);
     PrimaryRays(scene, rays, 2).draw(view, 0, std::array{Rect{0, 0, view.size().width, view.size().height}}, keys);
     EXPECT_EQ(refusal_of_light(scene, settings, plan_passes(requirements, settings)), "");
-    MakeLightDevice make;
+    MakeTileShader make;
     if (by_device) {
-      make = [&](const LightSources& sources) { return std::make_unique<GpuLight>(device(), sources, 2); };
+      make = [&](const ShadingInputs& sources) { return std::make_unique<GpuTileShader>(device(), sources, 2); };
     }
     DeferredShader shader(scene, settings, requirements, {}, nullptr, make);
     EXPECT_EQ(shader.lights_on_device(), by_device);
@@ -67,6 +68,7 @@ class GpuLightTest : public test::OnGpu {
       }
     }
     lit.counts = shader.counts();
+    for (const PassTime& time : shader.times()) lit.by_cpu_ms += time.name == "direct" ? time.ms : 0.0;
     return lit;
   }
 
@@ -108,12 +110,12 @@ RaySettings plain_settings() {
   return settings;
 }
 
-TEST_F(GpuLightTest, IsThatOfTheCpu) {
+TEST_F(GpuTileShaderTest, IsThatOfTheCpu) {
   const Scene scene = load_scene("gen:gallery");
   expect_as_cpu(scene, plain_settings(), view_of(scene, {64, 48}), "gallery");
 }
 
-TEST_F(GpuLightTest, HasExtensions) {
+TEST_F(GpuTileShaderTest, HasExtensions) {
   const Scene scene = load_scene("gen:extensions");
   expect_as_cpu(scene, plain_settings(), view_of(scene, {64, 48}), "extensions");
 }
@@ -150,7 +152,7 @@ Scene furnished_room() {
   return scene;
 }
 
-TEST_F(GpuLightTest, GathersPhotonsAndLooksThroughMedia) {
+TEST_F(GpuTileShaderTest, GathersPhotonsAndLooksThroughMedia) {
   const Scene scene = furnished_room();
   RaySettings settings = plain_settings();
   settings.passes = {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion, PassId::Photon};
@@ -161,7 +163,7 @@ TEST_F(GpuLightTest, GathersPhotonsAndLooksThroughMedia) {
 }
 
 /// What a thread's loops may not do on a software device is done by the CPU.
-TEST_F(GpuLightTest, LeavesToTheCpuWhatItCannotFinish) {
+TEST_F(GpuTileShaderTest, LeavesToTheCpuWhatItCannotFinish) {
   if (!device().info().software) GTEST_SKIP() << "GPUs do not end loops";
   Scene scene = test::white_floor();
   Light lamp;
@@ -186,6 +188,88 @@ TEST_F(GpuLightTest, LeavesToTheCpuWhatItCannotFinish) {
   const Lit cpu = light(scene, plain_settings(), view, false);
   const Lit gpu = light(scene, plain_settings(), view, true);
   EXPECT_EQ(gpu.pixels, cpu.pixels);
+  EXPECT_GT(gpu.by_cpu_ms, 0.0) << "the device finished";
+}
+
+TEST(GpuLightRefusals, AreSaid) {
+  const Scene plain = load_scene("gen:cornell");
+  const auto refusal = [](const Scene& scene, const auto& change) {
+    RaySettings settings = plain_settings();
+    change(settings);
+    return refusal_of_light(scene, settings, plan_passes(requirements_of(scene), settings));
+  };
+  const auto nothing = [](RaySettings&) {};
+  EXPECT_EQ(refusal(plain, nothing), "");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.denoise = true; }), "the denoiser is the CPU's");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.reference = true; }), "the reference is the CPU's");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.show = Show::Normal; }), "what is shown is no light");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.half_resolution = {PassId::Shadow}; }),
+            "passes at half resolution are the CPU's");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.part.emplace(); }), "rays travel between ranks");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.passes = {PassId::Gather}; }), "gathering by rays is the CPU's");
+  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.light_samples = 65; }), "more than 64 light samples are the CPU's");
+  Scene veiled = plain;
+  veiled.materials[0].alpha_mode = AlphaMode::Blend;
+  EXPECT_EQ(refusal(veiled, nothing), "surfaces that cover in part are the CPU's");
+  Scene coated = plain;
+  MaterialExtensions coat;
+  coat.clearcoat = 1.0F;
+  coated.materials[0].extensions = std::make_shared<const MaterialExtensions>(coat);
+  coated.materials[0].emissive = glm::vec3(1.0F);
+  EXPECT_EQ(refusal(coated, nothing), "emission through clear coats is the CPU's");
+}
+
+/// Several screens, tiles at their edges, a mask, no bounces, and a background of its own.
+TEST_F(GpuTileShaderTest, LightsMasksAndScreensOfAllKinds) {
+  const Scene scene = load_scene("gen:gallery");
+  View flat = view_of(scene, {70, 40});
+  flat.orthographic = true;
+  flat.near_distance = 0.01;
+  flat.far_distance = 50.0;
+  flat.left = flat.bottom = -2.0;
+  flat.right = flat.top = 2.0;
+  const std::array views{view_of(scene, {70, 50}), flat};
+  RaySettings settings = plain_settings();
+  settings.max_depth = 0;
+  settings.background = {Background::Kind::Color, {0.2F, 0.3F, 0.4F}};
+  const Requirements requirements = requirements_of(scene);
+  const RayScene rays(scene, RaySpace(scene), 2, covering_surfaces(scene, false));
+  const FrameLayout layout({views[0].size(), views[1].size()});
+  TileLayer<Key> keys(layout);
+  for (std::size_t screen = 0; screen < 2; ++screen) {
+    const Size size = views.at(screen).size();
+    PrimaryRays(scene, rays, 2).draw(views.at(screen), screen, std::array{Rect{0, 0, size.width, size.height}}, keys);
+  }
+  PixelMask wanted(layout);
+  for (std::size_t tile = 0; tile < layout.tiles(); ++tile) {
+    for (std::size_t i = 0; i < kTilePixels; ++i) wanted.tile(tile)[i] = i % 3 == 0 && tile != 1 ? 1 : 0;
+  }
+  std::vector<std::size_t> tiles(layout.tiles());
+  std::iota(tiles.begin(), tiles.end(), std::size_t{0});
+  std::vector<TileLayer<Rgb>> lit;
+  for (const bool by_device : {false, true}) {
+    MakeTileShader make;
+    if (by_device) {
+      make = [&](const ShadingInputs& inputs) { return std::make_unique<GpuTileShader>(device(), inputs, 2); };
+    }
+    DeferredShader shader(scene, settings, requirements, {}, nullptr, make);
+    TileLayer<Rgb>& radiance = lit.emplace_back(layout);
+    const ShadedSample sample{views, &keys, {.radiance = &radiance}, {1, 7}, &wanted};
+    shader.shade(std::span(&sample, 1), tiles);
+    EXPECT_EQ(shader.counts()[PassId::Reflection], 0U);
+  }
+  std::size_t lit_pixels = 0;
+  std::size_t others = 0;
+  for (const std::size_t tile : tiles) {
+    for (std::size_t i = 0; i < kTilePixels; ++i) {
+      const Rgb& a = lit[0].tile(tile)[i];
+      const Rgb& b = lit[1].tile(tile)[i];
+      lit_pixels += a.r > 0.0F ? 1U : 0U;
+      others += std::abs(a.r - b.r) + std::abs(a.g - b.g) + std::abs(a.b - b.b) > 1e-4F * (a.r + a.g + a.b) ? 1U : 0U;
+    }
+  }
+  EXPECT_GT(lit_pixels, 500U);
+  EXPECT_LE(others, lit_pixels / 200);
 }
 
 }  // namespace
