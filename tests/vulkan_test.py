@@ -51,9 +51,9 @@ def keys_of_scenes(folder):
         expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
 
 
-def nearly_equal(folder, expected, found, what):
+def nearly_equal(folder, expected, found, what, allowed=1e-6):
     diff = json.loads(run(folder, "diff", expected, found, "--json").stdout)
-    expect(diff["relmse_untrimmed"] <= 1e-4 and diff["not_finite"] == 0, f"{what}: relMSE {diff['relmse_untrimmed']}")
+    expect(diff["relmse_untrimmed"] <= allowed and diff["not_finite"] == 0, f"{what}: relMSE {diff['relmse_untrimmed']}")
     expect(diff["differing"] <= OTHERS_LIT * diff["pixels"] or diff["max"] < 1e-3, f"{what}: {diff['differing']} pixels differ")
 
 
@@ -84,10 +84,16 @@ def said_and_done(folder):
     # What devices do not do is done by Embree or OpenGL, and looks the same.
     plain = render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned")
     expect(render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned", "--backend", "vulkan") == plain, "parts of scenes")
+    draft = ("--quality", "draft")
+    for settings, reason in (((*draft, "--aov", "albedo"), "further layers"), ((*draft, "--denoise"), "denoiser"),
+                             ((*draft, "--light-samples", "128"), "light samples")):
+        said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "--spp", "1", "-o", "e.exr", "--force", "--backend", "vulkan", "--explain", *settings)
+        words = said.stdout + said.stderr
+        expect("light: by the CPU (" in words and reason in words, f"{settings}: {words[-800:]}")
     few = ("--size", "64x48", "--spp", "20", "--adaptive", "--primary", "rays", "--force")
     hpr(folder, "render", "gen:cornell", "-o", "few.exr", *few)
     hpr(folder, "render", "gen:cornell", "-o", "few-gpu.exr", "--backend", "vulkan", *few)
-    nearly_equal(folder, "few.exr", "few-gpu.exr", "adaptive samples")
+    nearly_equal(folder, "few.exr", "few-gpu.exr", "adaptive samples", allowed=1e-3)
     drawn = ("--primary", "raster", "--depth-format", "24")
     expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan") == render(folder, "gen:cornell", *drawn), "OpenGL beside Vulkan")
     said = hpr(folder, "render", "gen:gallery", "--size", "128x96", "-o", "d.png", "--backend", "vulkan", "--ranks", "3", "--distribute", "sort-last",
