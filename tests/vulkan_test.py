@@ -51,7 +51,7 @@ def keys_of_scenes(folder):
         expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
 
 
-def nearly_equal(folder, expected, found, what, allowed=1e-6):
+def nearly_equal(folder, expected, found, what, allowed=1e-5):
     diff = json.loads(run(folder, "diff", expected, found, "--json").stdout)
     expect(diff["relmse_untrimmed"] <= allowed and diff["not_finite"] == 0, f"{what}: relMSE {diff['relmse_untrimmed']}")
     expect(diff["differing"] <= OTHERS_LIT * diff["pixels"] or diff["max"] < 1e-3, f"{what}: {diff['differing']} pixels differ")
