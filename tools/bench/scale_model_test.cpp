@@ -69,14 +69,15 @@ TEST(ScaleModel, HasEveryWallRankCountAndDistribution) {
 
 TEST(ScaleModel, LightIsWhatItTookHere) {
   ScaleInput input = input_of("gen:cornell");
-  const auto light_of = [&](const char* passes) {
+  const auto light_of = [&](const char* passes, const char* samples) {
     set_setting(input.settings, "passes", passes);
+    set_setting(input.settings, "light-samples", samples);
     const ScaleModelReport report = model_scale({}, input, cluster_of(2, 2), 0);
     EXPECT_NEAR(report.runs.front().frame.light_ms, 1e-6 * report.measured.light * 160.0 * 96.0,
                 1e-6 * report.runs.front().frame.light_ms);
     return report.measured.light;
   };
-  EXPECT_GT(light_of("shadow,ambient-occlusion,reflection"), 1.2 * light_of("none"));
+  EXPECT_GT(light_of("shadow,ambient-occlusion,reflection", "64"), 2.0 * light_of("none", "1"));
 }
 
 TEST(ScaleModel, SlowLinksAreWhatLimits) {
