@@ -259,14 +259,14 @@ std::vector<Image<Rgba8>> bring_to_screens(Session& session, Frame& frame, const
 std::string advice_on(const Image<Rgba8>& picture) {
   constexpr double kTooMuch = 0.9;
   const auto share_of = [&](const auto& is) {
-    // Once more than a tenth of all is otherwise, no more need be counted.
-    const std::size_t most_others = picture.size().area() / 10;
+    // Once so many are otherwise that it is not too much, no more need be counted.
+    const auto enough = static_cast<std::size_t>((1.0 - kTooMuch) * static_cast<double>(picture.size().area()));
     std::size_t there = 0;
     std::size_t others = 0;
     for (const Rgba8& color : picture.pixels()) {
       if (color.a == 0) continue;
       ++there;
-      if (!is(color) && ++others > most_others) return 0.0;
+      if (!is(color) && ++others > enough) return 0.0;
     }
     if (there > 0) return static_cast<double>(there - others) / static_cast<double>(there);
     return static_cast<double>(std::ranges::count_if(picture.pixels(), is)) /

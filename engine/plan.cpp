@@ -377,7 +377,7 @@ std::string refusal_of_light(const Session& session, const FramePlan& plan, std:
 
 /// Whether a device lights, where one was asked for, and why not.
 void choose_light(const Session& session, FramePlan& plan, std::span<const View> views) {
-  if (!session.has_gpu() || !needs_light(plan.rays.show)) return;
+  if (!session.has_vulkan() || !needs_light(plan.rays.show)) return;
   const std::string refusal = refusal_of_light(session, plan, views);
   plan.rays.on_device = refusal.empty();
   plan.explained.push_back(refusal.empty() ? "light: on the device" : fmt::format("light: by the CPU ({})", refusal));

@@ -391,8 +391,8 @@ DeferredShader& Session::shader(const RaySettings& settings) {
     MakeTileShader make_device;
     if (own.on_device) {
       HPR_CHECK(gpu_ && refusal_of_light(own).empty());
-      make_device = [this](const ShadingInputs& sources) {
-        return std::make_unique<GpuTileShader>(*gpu_, sources, host_.threads);
+      make_device = [this](const ShadingInputs& inputs) {
+        return std::make_unique<GpuTileShader>(*gpu_, inputs, host_.threads);
       };
     }
     shader_ = std::make_unique<DeferredShader>(

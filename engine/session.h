@@ -107,7 +107,7 @@ class Session {
   /// That device, with `objects` on it.
   [[nodiscard]] GpuPrimaryRays& gpu_primary_rays(std::span<const SurfaceRange> objects);
   /// Whether Vulkan was asked for.
-  [[nodiscard]] bool has_gpu() const { return gpu_ != nullptr; }
+  [[nodiscard]] bool has_vulkan() const { return gpu_ != nullptr; }
   /// Why no device lights by these settings; empty: one does (shader()).
   [[nodiscard]] std::string refusal_of_light(const RaySettings& settings) const;
   /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "gpu/bvh.h"
-#include "gpu/device/gpu_upload.h"
+#include "gpu/device/gpu_tables.h"
 
 namespace hpr {
 namespace {

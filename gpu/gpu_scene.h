@@ -6,7 +6,7 @@
 #include <span>
 
 #include "gpu/device/gpu_device.h"
-#include "gpu/device/gpu_upload.h"
+#include "gpu/device/gpu_tables.h"
 #include "scene/scene.h"
 
 namespace hpr {

@@ -633,10 +633,6 @@ bool DeferredShader::is_whole() const {
   return state_->reference || state_->forwarding != nullptr;
 }
 
-bool DeferredShader::lights_on_device() const {
-  return state_->device != nullptr;
-}
-
 bool DeferredShader::shades_whole_tiles() const {
   return state_->settings.denoise || state_->shared != 0;
 }

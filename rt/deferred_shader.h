@@ -29,8 +29,8 @@ class RayForwarding;
 class TileShader;
 struct ShadingInputs;
 
-/// Makes what lights by a scene's sources in the CPU's stead, see rt/tile_shader.h; null where that is to be the CPU.
-using MakeTileShader = std::function<std::unique_ptr<TileShader>(const ShadingInputs& sources)>;
+/// Makes what lights in the CPU's stead, see rt/tile_shader.h; null where that is to be the CPU.
+using MakeTileShader = std::function<std::unique_ptr<TileShader>(const ShadingInputs& inputs)>;
 
 /// Layers that shading writes, all of one layout; null where not wanted.
 struct LightOutput {
@@ -71,11 +71,11 @@ class DeferredShader {
   /// a planned pass needs them. They outlive the shader.
   using RaySource = std::function<const RayScene&()>;
 
-  /// `make_device`: called once; what it makes lights what it can.
   /// Builds a ray scene of its own if a planned pass needs one and there is no `rays`. The scene must outlive this, and
   /// so must `forwarding`, by which rays reach what is not in `settings.part`: then shade() and this constructor are
   /// collective. Throws Error: Usage for an unknown pass, NoDevice when Embree fails. Finding out what a scene requires
   /// reads every texel once.
+  /// `make_device`: called once; what it makes lights what it can.
   DeferredShader(const Scene& scene, RaySettings settings, const Requirements& requirements, const RaySource& rays = {},
                  RayForwarding* forwarding = nullptr, const MakeTileShader& make_device = {});
   DeferredShader(const Scene& scene, const RaySettings& settings)
@@ -112,8 +112,6 @@ class DeferredShader {
   void shade(std::span<const ShadedSample> samples, const NextPart& next);
   /// Whether a list of tiles must be shaded as a whole: the reference, and rays that travel.
   [[nodiscard]] bool is_whole() const;
-  /// Whether a device lights tiles: then parts of them are better left to it.
-  [[nodiscard]] bool lights_on_device() const;
   /// Whether no part may be less than a tile: filters look about in it.
   [[nodiscard]] bool shades_whole_tiles() const;
   /// Of the last shade(): what each tile or part took, in no order; nothing of the reference.

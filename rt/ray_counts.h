@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -57,7 +58,15 @@ struct RayCounts {
   [[nodiscard]] std::uint64_t& operator[](PassId pass) { return passes.at(static_cast<std::size_t>(pass)); }
   [[nodiscard]] std::uint64_t operator[](PassId pass) const { return passes.at(static_cast<std::size_t>(pass)); }
 
-  RayCounts& operator+=(const RayCounts& other);
+  RayCounts& operator+=(const RayCounts& other) {
+    primary += other.primary;
+    for (std::size_t i = 0; i < kPasses; ++i) passes[i] += other.passes[i];
+    invalid += other.invalid;
+    cut += other.cut;
+    not_finite += other.not_finite;
+    first_not_finite = std::min(first_not_finite, other.first_not_finite);
+    return *this;
+  }
   bool operator==(const RayCounts&) const = default;
 };
 

@@ -49,28 +49,28 @@ GpuLights::GpuLights(const GpuDevice& device, const Scene& scene, const LightSam
 
   std::vector<GpuPunctualLight> punctual;
   for (const Light& light : sampler.punctual()) punctual.push_back(punctual_light_of(light));
-  root.punctual = tables_.upload(std::span(punctual));
+  root.punctual = tables_.upload(punctual);
   root.punctual_count = count_of(punctual.size());
   root.enumerated = count_of(sampler.enumerated());
 
   const TriangleLights& triangles = sampler.triangles();
   const std::vector<GpuTriangleLight> emitting = triangle_lights_of(scene, triangles);
-  root.triangles = tables_.upload(std::span(emitting));
+  root.triangles = tables_.upload(emitting);
   root.triangles_count = count_of(emitting.size());
 
   root.background = {scene.background.r, scene.background.g, scene.background.b};
   if (sampler.environment_map()) {
     const GpuEnvironment environment = upload_environment(tables_, *sampler.environment_map());
-    root.environment = tables_.upload(std::span(&environment, 1));
+    root.environment = tables_.upload_one(environment);
     root.has_environment = 1;
   }
 
   const LightSampler::Choices& choices = sampler.choices();
   root.tree = upload_light_tree(tables_, choices.tree);
-  root.in_tree = tables_.upload(std::span(choices.in_tree));
+  root.in_tree = tables_.upload(choices.in_tree);
   root.first_triangle = count_of(choices.first_triangle);
-  root.outside = tables_.upload(std::span(choices.outside));
-  root.outside_sums = tables_.upload(std::span(choices.outside_sums));
+  root.outside = tables_.upload(choices.outside);
+  root.outside_sums = tables_.upload(choices.outside_sums);
   root.outside_count = count_of(choices.outside.size());
 
   root.power_sums = tables_.upload(sampler.power_sums());
@@ -79,7 +79,7 @@ GpuLights::GpuLights(const GpuDevice& device, const Scene& scene, const LightSam
   root.has_media = sampler.media().empty() ? 0 : 1;
   root.lit_center = sampler.lit_sphere().center;
   root.lit_radius = sampler.lit_sphere().radius;
-  address_ = tables_.upload(std::span(&root, 1));
+  address_ = tables_.upload_one(root);
 }
 
 }  // namespace hpr

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "gpu/device/gpu_device.h"
-#include "gpu/device/gpu_upload.h"
+#include "gpu/device/gpu_tables.h"
 #include "gpu/light/gpu_materials.h"
 #include "rt/lights/light_sampler.h"
 #include "scene/scene.h"

@@ -8,8 +8,8 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <span>
+#include <vector>
 
-#include "gpu/device/gpu_upload.h"
 #include "rt/materials/material_point.h"
 #include "rt/materials/sheen.h"
 
@@ -107,7 +107,8 @@ GpuExtensions converted(const MaterialExtensions& from) {
 
 }  // namespace
 
-GpuMaterials::GpuMaterials(const GpuDevice& device, const Scene& scene) : textures_(device, scene.textures) {
+GpuMaterials::GpuMaterials(const GpuDevice& device, const Scene& scene)
+    : textures_(device, scene.textures), tables_(device) {
   std::vector<GpuMaterial> materials;
   std::vector<GpuExtensions> extensions;
   for (const Material& material : scene.materials) {
@@ -116,14 +117,10 @@ GpuMaterials::GpuMaterials(const GpuDevice& device, const Scene& scene) : textur
     made.extensions = static_cast<std::int32_t>(extensions.size());
     extensions.push_back(converted(*material.extensions));
   }
-  const auto add = [&](auto values) { return buffers_.emplace_back(upload(device, values)).address(); };
-  const std::uint64_t all = add(std::span(materials));
-  const std::uint64_t all_extensions = add(std::span(extensions));
   const bool has_sheen =
       std::ranges::any_of(extensions, [](const GpuExtensions& each) { return each.sheen_color != glm::vec3(0.0F); });
-  const std::uint64_t sheen = has_sheen ? add(sheen_albedo_table()) : 0;
-  const std::array<std::uint64_t, 4> root{textures_.address(), all, all_extensions, sheen};
-  add(std::span(root));
+  address_ = tables_.upload_one(std::array{textures_.address(), tables_.upload(materials), tables_.upload(extensions),
+                                           has_sheen ? tables_.upload(sheen_albedo_table()) : 0});
 }
 
 }  // namespace hpr

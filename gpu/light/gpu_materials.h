@@ -1,10 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
-#include "gpu/device/gpu_buffer.h"
 #include "gpu/device/gpu_device.h"
+#include "gpu/device/gpu_tables.h"
 #include "gpu/light/gpu_textures.h"
 #include "scene/scene.h"
 
@@ -18,11 +17,12 @@ class GpuMaterials {
   GpuMaterials(const GpuDevice& device, const Scene& scene);
 
   /// As Materials of materials.glsl.
-  [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
+  [[nodiscard]] std::uint64_t address() const { return address_; }
 
  private:
   GpuTextures textures_;
-  std::vector<GpuBuffer> buffers_;  ///< what others refer to comes before them
+  GpuTables tables_;
+  std::uint64_t address_ = 0;
 };
 
 }  // namespace hpr

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "core/error.h"
-#include "gpu/device/gpu_upload.h"
+#include "gpu/device/gpu_tables.h"
 #include "scene/bounds.h"
 
 namespace hpr {

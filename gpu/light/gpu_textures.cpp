@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <map>
 #include <utility>
+#include <vector>
 
-#include "gpu/device/gpu_upload.h"
 #include "image/color.h"
 
 namespace hpr {
@@ -27,7 +27,7 @@ static_assert(sizeof(Rgba8) == 4);
 
 }  // namespace
 
-GpuTextures::GpuTextures(const GpuDevice& device, std::span<const Texture> textures) {
+GpuTextures::GpuTextures(const GpuDevice& device, std::span<const Texture> textures) : tables_(device) {
   std::vector<GpuTexture> items;
   std::vector<Rgba8> texels;
   std::map<std::pair<const Rgba8*, std::size_t>, std::size_t> first_of;
@@ -50,13 +50,9 @@ GpuTextures::GpuTextures(const GpuDevice& device, std::span<const Texture> textu
   std::array<double, 256> levels{};
   for (std::size_t i = 0; i < levels.size(); ++i) levels.at(i) = srgb_to_linear(static_cast<std::uint8_t>(i));
 
-  buffers_.push_back(upload(device, std::span(texels)));
-  for (GpuTexture& item : items) item.image = buffers_.back().address() + item.image * sizeof(Rgba8);
-  buffers_.push_back(upload(device, std::span(items)));
-  const std::uint64_t all = buffers_.back().address();
-  buffers_.push_back(upload(device, std::span(levels)));
-  const std::array<std::uint64_t, 2> root{all, buffers_.back().address()};
-  buffers_.push_back(upload(device, std::span(root)));
+  const std::uint64_t first = tables_.upload(texels);
+  for (GpuTexture& item : items) item.image = first + item.image * sizeof(Rgba8);
+  address_ = tables_.upload_one(std::array{tables_.upload(items), tables_.upload_one(levels)});
 }
 
 }  // namespace hpr

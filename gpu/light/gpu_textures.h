@@ -2,10 +2,9 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
-#include "gpu/device/gpu_buffer.h"
 #include "gpu/device/gpu_device.h"
+#include "gpu/device/gpu_tables.h"
 #include "scene/scene.h"
 
 namespace hpr {
@@ -18,10 +17,11 @@ class GpuTextures {
   GpuTextures(const GpuDevice& device, std::span<const Texture> textures);
 
   /// As Textures of textures.glsl.
-  [[nodiscard]] std::uint64_t address() const { return buffers_.back().address(); }
+  [[nodiscard]] std::uint64_t address() const { return address_; }
 
  private:
-  std::vector<GpuBuffer> buffers_;  ///< what others refer to comes before them
+  GpuTables tables_;
+  std::uint64_t address_ = 0;
 };
 
 }  // namespace hpr

@@ -129,11 +129,11 @@ bool is_finished(std::span<const glm::vec4> pixels) {
   return std::ranges::none_of(pixels, [](const glm::vec4& pixel) { return pixel.a < 0.0F; });
 }
 
-GpuPathLimits limits_of(const ShadingInputs& sources) {
-  GpuPathLimits limits{.glossy_cutoff = sources.settings.glossy_cutoff,
-                       .max_depth = static_cast<std::uint32_t>(sources.settings.max_depth)};
+GpuPathLimits limits_of(const ShadingInputs& inputs) {
+  GpuPathLimits limits{.glossy_cutoff = inputs.settings.glossy_cutoff,
+                       .max_depth = static_cast<std::uint32_t>(inputs.settings.max_depth)};
   for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
-    if (sources.followed_lobes.at(lobe)) limits.followed |= 1U << lobe;
+    if (inputs.followed_lobes.at(lobe)) limits.followed |= 1U << lobe;
   }
   return limits;
 }
@@ -165,21 +165,21 @@ std::string refusal_of_light(const Scene& scene, const RaySettings& settings, st
   return {};
 }
 
-GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& sources, int threads)
+GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& inputs, int threads)
     : device_(device),
-      sources_(sources),
-      scene_(device, sources.scene, std::array{SurfaceRange{0, sources.scene.triangles}}, threads),
-      surfaces_(device, sources.scene, sources.surfaces),
-      materials_(device, sources.scene),
-      lights_(device, sources.scene, sources.lights, materials_),
+      inputs_(inputs),
+      scene_(device, inputs.scene, std::array{SurfaceRange{0, inputs.scene.triangles}}, threads),
+      surfaces_(device, inputs.scene, inputs.surfaces),
+      materials_(device, inputs.scene),
+      lights_(device, inputs.scene, inputs.lights, materials_),
       photons_(device),
       input_(device, sizeof(GpuLightInput), GpuMemory::Upload),
       counters_(device, kCounters * sizeof(std::uint32_t), GpuMemory::Readback),
       batch_(device) {
-  const bool extended = has_extensions(sources.scene);
+  const bool extended = has_extensions(inputs.scene);
   for (const StepInfo& step : steps()) {
     const auto shader = extended ? step.shader : step.plain_shader;
-    const bool runs = !step.pass || runs_pass(sources.plan, *step.pass);
+    const bool runs = !step.pass || runs_pass(inputs.plan, *step.pass);
     kernels_.push_back(runs ? std::make_unique<GpuKernel>(device, shader, sizeof(Constants)) : nullptr);
     times_.push_back({std::string(step.name), 0.0, step.pass});
   }
@@ -271,7 +271,7 @@ bool GpuTileShader::follow_paths(std::size_t tiles, const TilesToShade& lit) {
 void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
                                RayCounts& counts, const Store& store) {
   const FrameLayout& layout = sample.keys->layout();
-  const RaySettings& settings = sources_.settings;
+  const RaySettings& settings = inputs_.settings;
   grow(tiles.size(), sample.views.size());
   for (std::size_t i = 0; i < sample.views.size(); ++i) {
     views_->mapped<GpuView>()[i] = as_read(sample.views[i]);
@@ -305,8 +305,8 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
                       .counters = counters_.address(),
                       .random_frame = frame_stream({settings.seed, sample.number.frame}),
                       .ambient = settings.ambient,
-                      .occlusion_reach = occlusion_reach(sources_.scene),
-                      .limits = limits_of(sources_),
+                      .occlusion_reach = occlusion_reach(inputs_.scene),
+                      .limits = limits_of(inputs_),
                       .sample_index = sample.number.sample,
                       .light_samples = static_cast<std::uint32_t>(settings.light_samples),
                       .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
@@ -315,7 +315,7 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
     const Rgb& color = settings.background.color;
     input.background = {color.r, color.g, color.b};
   }
-  input.shadows = runs_pass(sources_.plan, PassId::Shadow) ? 1 : 0;
+  input.shadows = runs_pass(inputs_.plan, PassId::Shadow) ? 1 : 0;
   input.terminator_fix = settings.terminator_fix ? 1 : 0;
   input_.mapped<GpuLightInput>()[0] = input;
   std::ranges::fill(counters_.mapped<std::uint32_t>(), 0U);

@@ -25,9 +25,9 @@ namespace hpr {
 /// equal light on devices of one kind, whatever tiles are lit together; that of the CPU differs by rounding.
 class GpuTileShader final : public TileShader {
  public:
-  /// Puts what `sources` have on the device. Both must outlive this. `threads` build trees. Throws Error (Limit) where
+  /// Puts what `inputs` have on the device. Both must outlive this. `threads` build trees. Throws Error (Limit) where
   /// the device's memory ends.
-  GpuTileShader(const GpuDevice& device, const ShadingInputs& sources, int threads);
+  GpuTileShader(const GpuDevice& device, const ShadingInputs& inputs, int threads);
 
   void shade(const TilesToShade& lit, RayCounts& counts, const Store& store) override;
   [[nodiscard]] std::span<const PassTime> times() const override { return times_; }
@@ -42,7 +42,7 @@ class GpuTileShader final : public TileShader {
                   RayCounts& counts, const Store& store);
 
   const GpuDevice& device_;
-  ShadingInputs sources_;
+  ShadingInputs inputs_;
   GpuScene scene_;
   GpuSurfaces surfaces_;
   GpuMaterials materials_;

@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "gpu/device/gpu_upload.h"
+#include "gpu/device/gpu_tables.h"
 #include "rt/lights/environment_map.h"
 #include "rt/lights/light_tree.h"
 #include "rt/lights/triangle_lights.h"

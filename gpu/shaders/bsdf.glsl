@@ -13,12 +13,6 @@ bool bsdf_is_delta(Bsdf b, uint lobe) {
   return is_extended(b) ? extended_is_delta(b, lobe) : plain_is_delta(b.plain, lobe);
 }
 
-// f of one lobe, 1/sr, and the density of sampling that direction.
-dvec3 bsdf_lobe(Bsdf b, uint lobe, dvec3 to_light, out double pdf) {
-  if (is_extended(b)) return extended_lobe(b, lobe, to_light, pdf);
-  return plain_lobe(b.plain, lobe, to_light, pdf);
-}
-
 // f and density of every lobe.
 Scattering bsdf_scattering(Bsdf b, dvec3 to_light) {
   if (!is_extended(b)) return plain_scattering(b.plain, to_light);

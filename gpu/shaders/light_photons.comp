@@ -3,23 +3,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "threads.glsl"
 
-#include "reals.glsl"
-#include "sampling.glsl"
-#include "sampler.glsl"
-#include "scene.glsl"
-#include "surface_point.glsl"
-#include "surfaces.glsl"
-#include "view.glsl"
-#include "textures.glsl"
-#include "materials.glsl"
-#include "media.glsl"
-#include "microfacets.glsl"
-#include "all_bsdfs.glsl"
-#include "path.glsl"
+#include "light_kernel.glsl"
 #include "reflection_terms.glsl"
 #include "photons.glsl"
 #include "gathered_terms.glsl"
-#include "light_state.glsl"
 
 void main() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;

@@ -3,26 +3,8 @@
 #extension GL_GOOGLE_include_directive : require
 #include "threads.glsl"
 
-#include "reals.glsl"
-#include "sampling.glsl"
-#include "sampler.glsl"
-#include "scene.glsl"
-#include "surface_point.glsl"
-#include "surfaces.glsl"
-#include "view.glsl"
-#include "textures.glsl"
-#include "materials.glsl"
-#include "media.glsl"
-#include "microfacets.glsl"
-#include "all_bsdfs.glsl"
-#include "path.glsl"
-#include "light_state.glsl"
-#include "discrete.glsl"
-#include "environment.glsl"
-#include "light_tree.glsl"
-#include "punctual_lights.glsl"
-#include "triangle_lights.glsl"
-#include "lights.glsl"
+#include "light_kernel.glsl"
+#include "all_lights.glsl"
 
 void main() {
   if (!start_pixel()) return;

@@ -3,20 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "threads.glsl"
 
-#include "reals.glsl"
-#include "sampling.glsl"
-#include "sampler.glsl"
-#include "scene.glsl"
-#include "surface_point.glsl"
-#include "surfaces.glsl"
-#include "view.glsl"
-#include "textures.glsl"
-#include "materials.glsl"
-#include "media.glsl"
-#include "microfacets.glsl"
-#include "all_bsdfs.glsl"
-#include "path.glsl"
-#include "light_state.glsl"
+#include "light_kernel.glsl"
 
 void main() {
   if (!start_pixel()) return;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "gpu/device/gpu_buffer.h"
@@ -10,24 +11,17 @@
 
 namespace hpr {
 
-/// A buffer in the device's own memory that holds `bytes`; the copy is done. Throws Error (Limit) where the device has
-/// not so much memory left.
-[[nodiscard]] GpuBuffer upload(const GpuDevice& device, std::span<const std::byte> bytes);
-
-template <typename T, std::size_t kCount>
-[[nodiscard]] GpuBuffer upload(const GpuDevice& device, std::span<T, kCount> values) {
-  return upload(device, std::span<const std::byte>(std::as_bytes(values)));
-}
-
 /// Arrays in a device's memory that the CPU made and shaders read. The device must outlive it.
 class GpuTables {
  public:
   explicit GpuTables(const GpuDevice& device) : device_(device) {}
 
-  /// Returns the address; 0 for an empty array. Throws Error (Limit) where the device has not so much memory left.
+  /// Returns the address, once the copy is done; 0 for an empty array. Throws Error (Limit) where the device has not so
+  /// much memory left.
   template <typename T, std::size_t kCount>
   std::uint64_t upload(std::span<T, kCount> values) {
-    return values.empty() ? 0 : buffers_.emplace_back(hpr::upload(device_, values)).address();
+    static_assert(std::is_trivially_copyable_v<T>);
+    return upload_bytes(std::as_bytes(values));
   }
   template <typename T>
   std::uint64_t upload(const std::vector<T>& values) {
@@ -39,6 +33,8 @@ class GpuTables {
   }
 
  private:
+  std::uint64_t upload_bytes(std::span<const std::byte> bytes);
+
   const GpuDevice& device_;
   std::vector<GpuBuffer> buffers_;
 };
