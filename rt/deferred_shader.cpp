@@ -12,21 +12,14 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/timing.h"
-#include "rt/denoise/coverage_fragments.h"
+#include "rt/deferred_state.h"
 #include "rt/denoise/denoiser.h"
 #include "rt/lights/direct_light.h"
 #include "rt/passes/half_resolution.h"
-#include "rt/passes/pass.h"
-#include "rt/passes/path_vertex.h"
 #include "rt/passes/pixel_sums.h"
 #include "rt/passes/tile_margin.h"
-#include "rt/photons/photon_tracer.h"
-#include "rt/reference/path_tracer.h"
 #include "rt/show/show_pixels.h"
-#include "rt/tile_scratch.h"
 #include "rt/tile_shader.h"
-#include "rt/trace/ray_forwarding.h"
-#include "rt/trace/ray_scene.h"
 
 namespace hpr {
 namespace {
@@ -38,16 +31,6 @@ void check_sizes(std::span<const ShadedSample> samples) {
     for (std::size_t i = 0; i < sample.views.size(); ++i) HPR_CHECK(sample.views[i].size() == layout.size(i));
   }
 }
-
-// Where each step's time stands.
-constexpr std::size_t kSurfaceStep = 0;
-constexpr std::size_t kDirectStep = 1;
-constexpr std::size_t kFirstPassStep = 2;
-
-struct RunningPass {
-  const PassInfo& info;
-  std::unique_ptr<Pass> pass;
-};
 
 bool gathers_all_lobes(std::span<const PassPlan> plan) {
   return runs_pass(plan, [](const PassInfo& pass) { return pass.gathers_all_lobes; });
@@ -64,85 +47,6 @@ ConstantEnvironment constant_environment_of(std::span<const PassPlan> plan) {
 }
 
 }  // namespace
-
-struct DeferredShader::State {
-  const Scene& scene;
-  RaySettings settings;
-  std::vector<PassPlan> plan;
-  RaySpace space;
-  Surfaces surfaces;
-  LightSampler lights;
-  MediumFinder media;
-  std::vector<RunningPass> passes;
-  ComponentSet shared = 0;  ///< see HalfResShading
-  std::array<bool, kLobes.size()> followed_lobes{};
-  bool gathers;
-  std::optional<RayScene> own_opaque;
-  const RayScene* opaque = nullptr;
-  std::optional<RayScene> alpha_tested;
-  std::optional<CoverageTraversal> rays;
-  std::optional<RayScene> whole;  ///< for photons; only where `opaque` is not all
-  std::optional<PhotonMapBuilder> photons;
-  std::optional<PathTracer> reference;
-  CoverageFragments fragments;  ///< of the pixels that denoising samples again
-  ScratchPool<TileScratch> tile_memory;
-  ScratchPool<WaveScratch> wave_memory;
-  std::mutex mutex;
-  RayCounts counts;
-  double photon_ms = 0.0;   ///< spent on tracing photons, since the last gather_counts()
-  bool has_warned = false;  ///< that rays were cut
-  std::vector<PassTime> times;
-  std::vector<TileCost> costs;  ///< of the parts that the last shade() shaded
-
-  RayForwarding* forwarding;
-  std::unique_ptr<TileShader> device;  ///< null: the CPU lights all
-
-  State(const Scene& lit, RaySettings chosen, const Requirements& requirements, const RaySource& source,
-        RayForwarding* others, const MakeTileShader& make_device);
-  void build_rays(const RaySource& source);
-  const RayScene& build(std::optional<RayScene>& made, std::vector<SurfaceRange> objects);
-  void build_photons();
-  void build_reference();
-  void for_each(std::size_t count, const std::function<void(std::size_t)>& body) const;
-  /// What rays meet that decide about coverage themselves.
-  const RayScene& whole_scene();
-  void trace_reference(const ShadedSample& sample, std::span<const std::size_t> tiles);
-  const PhotonMaps* photon_maps(const SampleNumber& number);
-  void warn_of_cut_rays();
-  [[nodiscard]] std::size_t steps() const { return kFirstPassStep + passes.size() + 1; }
-  void show_tile(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, std::size_t index,
-                 std::span<const ShadedSample> samples) const;
-  void shade_tile(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, std::size_t index,
-                  std::span<const ShadedSample> samples);
-  [[nodiscard]] std::size_t count_margins(const LightContext& context, const TileJob& job, bool denoises) const;
-  void start_filters(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, bool denoises,
-                     std::size_t margins);
-  void shade_margins(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, bool denoises);
-  void denoise(const LightContext& context, TileScratch& scratch, std::span<const TileJob> jobs, std::size_t index);
-  /// What all parts of a call of shade() share.
-  struct Call {
-    std::span<const ShadedSample> samples;
-    const PhotonMaps* photons = nullptr;
-    std::vector<Media> eyes;
-  };
-  [[nodiscard]] Call start_call(std::span<const ShadedSample> samples);
-  void shade_part(const Call& call, const ShadedPart& part);
-  void gather_counts(double spent_ms);
-  /// Tile `index` in some samples.
-  struct TilePart {
-    std::span<const TileJob> jobs;
-    std::span<const ShadedSample> samples;
-    std::size_t index = 0;
-    bool denoises = false;
-  };
-  void shade_rows(const LightContext& context, TileScratch& scratch, WaveScratch& memory, const TilePart& part,
-                  const RowRange& rows) const;
-  void shade_points(const LightContext& context, TileScratch& scratch);
-  void shade_waves(std::size_t count, TileScratch& scratch, const std::function<void(std::size_t, WaveScratch&)>& body);
-  void shade_all_rows(const LightContext& context, TileScratch& scratch, const TilePart& part);
-  void shade_waiting(const LightContext& context, WaveScratch& memory, PixelSums& sums) const;
-  void shade_wavefront(const LightContext& context, WaveScratch& memory, PixelSums& sums) const;
-};
 
 DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Requirements& requirements,
                              const RaySource& source, RayForwarding* others, const MakeTileShader& make_device)
@@ -310,41 +214,55 @@ std::size_t DeferredShader::State::count_margins(const LightContext& context, co
                                                               : 0;
 }
 
-void DeferredShader::State::start_filters(const LightContext& context, TileScratch& scratch,
-                                          std::span<const TileJob> jobs, bool denoises, std::size_t margins) {
-  if (denoises) scratch.denoiser.start(jobs.size(), margins, scratch.sums.wants_components);
-  if (shared != 0) scratch.shared.start(shared, context, jobs.front());
+void DeferredShader::State::start_filters(const LightContext& context, TileScratch& scratch, const TilePart& part,
+                                          std::size_t margins, const UsePoints& use) {
+  if (part.denoises) {
+    const auto& layers = part.samples.front().output.components;
+    const bool filters_components = std::ranges::any_of(layers, [](const auto* layer) { return layer != nullptr; });
+    scratch.denoiser.start(part.jobs.size(), margins, filters_components);
+  }
+  if (shared != 0) scratch.shared.start(shared, context, part.jobs.front());
   scratch.margins.clear();
-  if (margins > 0) shade_margins(context, scratch, jobs, denoises);
+  if (margins > 0) find_margins(context, scratch, part, use);
 }
 
 /// What lies in those strips.
-void DeferredShader::State::shade_margins(const LightContext& context, TileScratch& scratch,
-                                          std::span<const TileJob> jobs, bool denoises) {
-  std::size_t first_tile = jobs.size() + (denoises ? 1 : 0);
+void DeferredShader::State::find_margins(const LightContext& context, TileScratch& scratch, const TilePart& part,
+                                         const UsePoints& use) {
+  const std::span<const TileJob> jobs = part.jobs;
+  std::size_t first_tile = jobs.size() + (part.denoises ? 1 : 0);
   scratch.margins.resize(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const Stopwatch watch;
     TileMargin& margin = scratch.margins[i];
-    margin.find(context, jobs[i], denoises ? Denoiser::reach(jobs[i].number.sample) : HalfResShading::kReach,
+    margin.find(context, jobs[i], part.denoises ? Denoiser::reach(jobs[i].number.sample) : HalfResShading::kReach,
                 static_cast<std::uint32_t>(first_tile * kTilePixels), scratch.own.buffers);
     first_tile += margin.strips().size();
     fetch_triangles(context, margin.strips());
     std::vector<PathVertex> points;
+    std::vector<PathVertex> found;
     for (const TileJob& strip : margin.strips()) {
-      points.clear();
-      find_primary_vertices(context, strip, {0, strip.rect.height()}, scratch.own.buffers, scratch.sums, points);
-      if (shared != 0) scratch.shared.add_margin(strip, points);
-      if (denoises) scratch.denoiser.add_vertices(context, points);
-      std::ranges::move(points, std::back_inserter(scratch.own.waiting[0]));
+      found.clear();
+      find_primary_vertices(context, strip, {0, strip.rect.height()}, scratch.own.buffers, scratch.sums, found);
+      if (shared != 0) scratch.shared.add_margin(strip, found);
+      if (part.denoises) scratch.denoiser.add_vertices(context, found);
+      std::ranges::move(found, std::back_inserter(points));
     }
     scratch.own.ms[kSurfaceStep] += watch.ms();
-    if (forwarding == nullptr) {
-      shade_waiting(context, scratch.own, scratch.sums);
-    } else {
-      scratch.margin_points.push_back(std::exchange(scratch.own.waiting[0], {}));
-    }
+    use(std::move(points));
   }
+}
+
+/// Clears the sums of a tile and starts its filters.
+void DeferredShader::State::start_tile(const LightContext& context, TileScratch& scratch, const TilePart& part,
+                                       const UsePoints& use) {
+  const std::size_t margins = part.jobs.size() * count_margins(context, part.jobs.front(), part.denoises);
+  scratch.sums.clear(part.jobs.front(), part.index, part.samples,
+                     {.all_components = shared != 0 || (part.denoises && Denoiser::keeps_direct(scene)),
+                      .diffuse = part.denoises,
+                      .cost = settings.show == Show::Cost,
+                      .margins = margins});
+  start_filters(context, scratch, part, margins, use);
 }
 
 /// Shades scratch.points: wavefronts of whole pixels, from the last one on.
@@ -371,9 +289,8 @@ void DeferredShader::State::denoise(const LightContext& context, TileScratch& sc
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const TileJob& job = jobs[i];
     if (job.number.sample >= kDenoisedSamples) break;
-    const auto margin = scratch.margins.empty() ? std::span<const TileJob>() : scratch.margins[i].strips();
-    scratch.denoiser.resample_edges(context, job, margin, tile_fragments, scratch.own.buffers, scratch.sums,
-                                    scratch.points);
+    scratch.denoiser.resample_edges(context, job, margin_of(scratch, i), tile_fragments, scratch.own.buffers,
+                                    scratch.sums, scratch.points);
     shade_points(context, scratch);
     scratch.denoiser.resolve(context, job, tile_fragments, scratch.sums);
   }
@@ -404,20 +321,26 @@ void DeferredShader::State::show_tile(const LightContext& context, TileScratch& 
   scratch.own.ms[kSurfaceStep] += watch.ms();
 }
 
+/// Finds what some rows of a tile show in one sample, which its filters learn too; `points` has none yet.
+void DeferredShader::State::find_rows(const LightContext& context, TileScratch& scratch, WaveScratch& memory,
+                                      const TilePart& part, std::size_t sample, const RowRange& rows,
+                                      std::vector<PathVertex>& points) const {
+  const Stopwatch watch;
+  find_primary_vertices(context, part.jobs[sample], rows, memory.buffers, scratch.sums, points);
+  add_first_surfaces(points, part.index, part.samples[sample].output);
+  if (shared != 0 || part.denoises) {
+    const std::lock_guard lock(scratch.mutex);
+    if (shared != 0) scratch.shared.choose(points, rows.first);
+    if (part.denoises) scratch.denoiser.add_vertices(context, points);
+  }
+  memory.ms[kSurfaceStep] += watch.ms();
+}
+
 /// Shades some rows of one sample after those of another: what one sample has read the next one finds in the cache.
 void DeferredShader::State::shade_rows(const LightContext& context, TileScratch& scratch, WaveScratch& memory,
                                        const TilePart& part, const RowRange& rows) const {
   for (std::size_t i = 0; i < part.jobs.size(); ++i) {
-    const Stopwatch watch;
-    std::vector<PathVertex>& points = memory.waiting[0];
-    find_primary_vertices(context, part.jobs[i], rows, memory.buffers, scratch.sums, points);
-    add_first_surfaces(points, part.index, part.samples[i].output);
-    if (shared != 0 || part.denoises) {
-      const std::lock_guard lock(scratch.mutex);
-      if (shared != 0) scratch.shared.choose(points, rows.first);
-      if (part.denoises) scratch.denoiser.add_vertices(context, points);
-    }
-    memory.ms[kSurfaceStep] += watch.ms();
+    find_rows(context, scratch, memory, part, i, rows, memory.waiting[0]);
     shade_waiting(context, memory, scratch.sums);
   }
 }
@@ -463,20 +386,20 @@ void DeferredShader::State::shade_tile(const LightContext& context, TileScratch&
   const trace::Span span("light tile", "tile", index);
   const DenormalsAsZero mode;
   PixelSums& sums = scratch.sums;
-  const bool denoises = settings.denoise && samples.front().number.sample < kDenoisedSamples;
-  const bool shows_cost = settings.show == Show::Cost;
-  const std::size_t margins = jobs.size() * count_margins(context, jobs.front(), denoises);
-  sums.clear(jobs.front(), index, samples,
-             {.all_components = shared != 0 || (denoises && Denoiser::keeps_direct(scene)),
-              .diffuse = denoises,
-              .cost = shows_cost,
-              .margins = margins});
-  start_filters(context, scratch, jobs, denoises, margins);
-  shade_all_rows(context, scratch, {jobs, samples, index, denoises});
+  const TilePart part{jobs, samples, index, denoises(samples.front().number)};
+  start_tile(context, scratch, part, [&](std::vector<PathVertex>&& points) {
+    if (forwarding != nullptr) {
+      scratch.margin_points.push_back(std::move(points));
+      return;
+    }
+    std::swap(scratch.own.waiting[0], points);
+    shade_waiting(context, scratch.own, scratch.sums);
+  });
+  shade_all_rows(context, scratch, part);
   if (shared != 0) scratch.shared.upsample(sums);
-  if (denoises) denoise(context, scratch, jobs, index);
+  if (part.denoises) denoise(context, scratch, jobs, index);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    if (shows_cost) show_cost(jobs[i], sums);
+    if (settings.show == Show::Cost) show_cost(jobs[i], sums);
     sums.store(jobs[i], index, samples[i].output, scratch.own.buffers.counts);
   }
 }
@@ -540,12 +463,11 @@ DeferredShader::State::Call DeferredShader::State::start_call(std::span<const Sh
   return call;
 }
 
-void DeferredShader::State::shade_part(const Call& call, const ShadedPart& part) {
+/// A tile's part in each sample.
+std::vector<TileJob> DeferredShader::State::jobs_of(const Call& call, const ShadedPart& part) const {
   const ShadedSample& first = call.samples.front();
   const TilePlace location = first.keys->layout().place(part.tile);
   const std::span<const std::uint8_t> wanted = part.keys != nullptr ? part.wanted : mask_of(first.wanted, part.tile);
-  if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
-  const CpuStopwatch watch;
   std::vector<TileJob> jobs;
   for (const ShadedSample& sample : call.samples) {
     const auto keys = part.keys != nullptr ? std::span(part.keys + jobs.size() * kTilePixels, kTilePixels)
@@ -558,17 +480,28 @@ void DeferredShader::State::shade_part(const Call& call, const ShadedPart& part)
                     wanted,
                     {part.first_row, part.end_row}});
   }
+  return jobs;
+}
+
+LightContext DeferredShader::State::context_of(const Call& call, std::size_t screen) const {
+  return {.scene = scene,
+          .surfaces = surfaces,
+          .rays = rays ? &*rays : nullptr,
+          .lights = lights,
+          .settings = settings,
+          .followed_lobes = followed_lobes,
+          .gathers = gathers,
+          .photons = call.photons,
+          .view = &call.samples.front().views[screen],
+          .eye_media = call.eyes[screen]};
+}
+
+void DeferredShader::State::shade_part(const Call& call, const ShadedPart& part) {
+  const std::vector<TileJob> jobs = jobs_of(call, part);
+  if (!wants_any(jobs.front().wanted)) return;
+  const CpuStopwatch watch;
   std::unique_ptr<TileScratch> scratch = tile_memory.take(steps());
-  const LightContext context{.scene = scene,
-                             .surfaces = surfaces,
-                             .rays = rays ? &*rays : nullptr,
-                             .lights = lights,
-                             .settings = settings,
-                             .followed_lobes = followed_lobes,
-                             .gathers = gathers,
-                             .photons = call.photons,
-                             .view = &first.views[location.screen],
-                             .eye_media = call.eyes[location.screen]};
+  const LightContext context = context_of(call, call.samples.front().keys->layout().place(part.tile).screen);
   if (needs_light(settings.show)) {
     shade_tile(context, *scratch, jobs, part.tile, call.samples);
   } else {
@@ -595,22 +528,22 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
   const State::Call call = state.start_call(samples);
   const Stopwatch watch;
   RayCounts traced;
+  double device_ms = 0.0;
   const std::vector<std::size_t> left =
-      shade_on_device(state.device.get(), {samples, tiles, call.eyes, call.photons, is_overtaken}, traced);
-  const double device_ms = watch.ms() * state.settings.threads;
+      state.light_by_device(call, {samples, tiles, call.eyes, call.photons, is_overtaken}, traced, device_ms);
+  const double before_ms = watch.ms() * state.settings.threads;
   const std::vector<std::size_t> order = fullest_first(left, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
     if (is_overtaken && is_overtaken()) return;
-    const std::span<const std::uint8_t> wanted = mask_of(first.wanted, order[i]);
-    if (!wanted.empty() && std::ranges::find(wanted, std::uint8_t{1}) == wanted.end()) return;
+    if (!wants_any(mask_of(first.wanted, order[i]))) return;
     for (const ShadedSample& sample : samples) set_active(sample.output, order[i]);
     state.shade_part(call, {.tile = order[i]});
   });
   state.gather_counts(watch.ms() * state.settings.threads);
   if (!state.device) return;
   state.counts += traced;
-  add_times(*state.device, device_ms, state.settings.threads, state.times);
-  for (const std::size_t tile : tiles) state.costs.push_back({tile, device_ms / static_cast<double>(tiles.size())});
+  add_times(*state.device, device_ms * state.settings.threads, state.settings.threads, state.times);
+  for (const std::size_t tile : tiles) state.costs.push_back({tile, before_ms / static_cast<double>(tiles.size())});
 }
 
 void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart& next) {

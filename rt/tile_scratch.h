@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <mutex>
 #include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -57,5 +58,10 @@ struct TileScratch {
   std::mutex mutex;         ///< of the filters and helpers_ms, where rows are shaded side by side
   double helpers_ms = 0.0;  ///< processor time of the threads that shaded some of its rows beside its own
 };
+
+/// The strips of a sample, if its filters read any.
+[[nodiscard]] inline std::span<const TileJob> margin_of(const TileScratch& scratch, std::size_t sample) {
+  return scratch.margins.empty() ? std::span<const TileJob>() : scratch.margins[sample].strips();
+}
 
 }  // namespace hpr

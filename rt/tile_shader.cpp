@@ -8,21 +8,16 @@
 #include "rt/passes/pixel_sums.h"
 
 namespace hpr {
-namespace {
 
-/// Whether only light is stored, and no layer of what it is made of.
 bool wants_light_alone(const LightOutput& output) {
   return std::ranges::all_of(output.components, [](const auto* layer) { return layer == nullptr; }) &&
          output.normal == nullptr && output.albedo == nullptr && output.cost == nullptr;
 }
 
-}  // namespace
-
-std::vector<std::size_t> shade_on_device(TileShader* device, const TilesToShade& lit, RayCounts& traced) {
-  if (device == nullptr || !wants_light_alone(lit.samples.front().output)) return {lit.tiles.begin(), lit.tiles.end()};
+std::vector<std::size_t> shade_on_device(TileShader& device, const TilesToShade& lit, RayCounts& traced) {
   const trace::Span span("light, on the device");
   std::set<std::size_t> unfinished;
-  device->shade(lit, traced, [&](const ShadedSample& sample, std::size_t tile, std::span<const glm::vec4> pixels) {
+  device.shade(lit, traced, [&](const ShadedSample& sample, std::size_t tile, std::span<const glm::vec4> pixels) {
     set_active(sample.output, tile);
     if (pixels.empty()) {
       unfinished.insert(tile);

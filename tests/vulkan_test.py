@@ -18,6 +18,7 @@ SIZE = (96, 72)
 OTHERS = 0.0005  # of the pixels may show another surface
 OTHERS_LIT = 0.05  # a ray of theirs meets another surface, or a sample more is taken
 SCENES = ("gen:cornell", "gen:gallery", "gen:sphereflake?s=2", "gen:tetra?s=5", "gen:asteroids", "gen:extensions", "gen:cloud?count=2000")
+DENOISED = ("gen:cornell", "gen:gallery", "gen:extensions")
 SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "4") for distribution in ("sort-first", "sort-last", "hybrid")]
 
 
@@ -44,8 +45,9 @@ def has_device(folder):
 
 def keys_of_scenes(folder):
     for scene in SCENES:
-        expected = surfaces(render(folder, scene, "--primary", "rays")[0])
-        found = surfaces(render(folder, scene, "--backend", "vulkan")[0])
+        quick = ("--quality", "draft", "--spp", "1")
+        expected = surfaces(render(folder, scene, "--primary", "rays", *quick)[0])
+        found = surfaces(render(folder, scene, "--backend", "vulkan", *quick)[0])
         others = sum(a != b for a, b in zip(found, expected))
         expect(others <= OTHERS * len(found), f"{scene}: {others} of {len(found)} pixels show another surface than Embree's")
         expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
@@ -60,24 +62,27 @@ def nearly_equal(folder, expected, found, what, allowed=1e-5):
 def light_of_scenes(folder):
     """By the same numbers along the same paths, so nearly the same pictures."""
     for scene in SCENES:
-        for photons in ("0", "20000"):
-            settings = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "draft", "--spp", "1", "--photons", photons, "--force")
+        kinds = [("--photons", "0"), ("--photons", "20000"), ("--photons", "20000", "--denoise")]
+        for kind in kinds if scene in DENOISED else kinds[:2]:
+            settings = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "draft", "--spp", "1", *kind, "--force")
             hpr(folder, "render", scene, "-o", "cpu.exr", "--primary", "rays", *settings)
             said = hpr(folder, "render", scene, "-o", "gpu.exr", "--backend", "vulkan", "--explain", *settings)
             expect("light: on the device" in said.stdout + said.stderr, f"{scene}: the CPU lights: {said.stderr[-400:]}")
-            nearly_equal(folder, "cpu.exr", "gpu.exr", scene)
+            nearly_equal(folder, "cpu.exr", "gpu.exr", f"{scene} {kind}")
 
 
 def spreads(folder):
     lit = ("--backend", "vulkan", "--spp", "2", "--quality", "draft")
-    alone = render(folder, "gen:gallery", *lit)
-    for spread in SPREADS:
-        expect(render(folder, "gen:gallery", *lit, *spread) == alone, f"other bits with {' '.join(spread)}")
+    for kind, spreads_of_kind in (((), SPREADS), (("--denoise",), SPREADS[2:4])):
+        alone = render(folder, "gen:gallery", *lit, *kind)
+        for spread in spreads_of_kind:
+            expect(render(folder, "gen:gallery", *lit, *kind, *spread) == alone, f"other bits with {' '.join(kind + spread)}")
 
 
 def said_and_done(folder):
     said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "b.png", "--backend", "vulkan", "--explain")
     words = said.stdout + said.stderr
+    expect("light: on the device" in words, f"the CPU lights a first picture: {words[-800:]}")
     expect("primary: rays (by " in words and "--backend vulkan" in words, f"does not say who makes the keys: {words[-800:]}")
     said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "c.png", "--backend", "vulkan", "--device", "99", code=2)
     expect("there is no Vulkan device 99" in said.stderr and "0: " in said.stderr, f"device 99: {said.stderr}")
@@ -85,7 +90,7 @@ def said_and_done(folder):
     plain = render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned")
     expect(render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned", "--backend", "vulkan") == plain, "parts of scenes")
     draft = ("--quality", "draft")
-    for settings, reason in (((*draft, "--aov", "albedo"), "further layers"), ((*draft, "--denoise"), "denoiser"),
+    for settings, reason in (((*draft, "--aov", "albedo"), "further layers"), ((*draft, "--passes", "gather"), "gathering"),
                              ((*draft, "--light-samples", "128"), "light samples")):
         said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "--spp", "1", "-o", "e.exr", "--force", "--backend", "vulkan", "--explain", *settings)
         words = said.stdout + said.stderr
@@ -95,7 +100,7 @@ def said_and_done(folder):
     hpr(folder, "render", "gen:cornell", "-o", "few-gpu.exr", "--backend", "vulkan", *few)
     nearly_equal(folder, "few.exr", "few-gpu.exr", "adaptive samples", allowed=1e-3)
     drawn = ("--primary", "raster", "--depth-format", "24")
-    expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan") == render(folder, "gen:cornell", *drawn), "OpenGL beside Vulkan")
+    expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan")[0] == render(folder, "gen:cornell", *drawn)[0], "OpenGL beside Vulkan")
     said = hpr(folder, "render", "gen:gallery", "--size", "128x96", "-o", "d.png", "--backend", "vulkan", "--ranks", "3", "--distribute", "sort-last",
                "--verify", "100")
     expect("differ" not in said.stderr, f"drawn again, keys are others: {said.stderr[-800:]}")

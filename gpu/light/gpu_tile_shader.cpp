@@ -31,20 +31,11 @@
 #include "rt/sampling/sampler.h"
 
 namespace hpr {
-namespace {
-
 /// Vertices of a pixel that may wait: two surfaces that a path begins with may split into all lobes and channels, what
 /// comes after does not.
-constexpr std::uint32_t kMaxWaiting = 12;
+static constexpr std::uint32_t kMaxWaiting = 12;
 
 /// As in light_state.glsl.
-struct GpuTile {
-  glm::ivec2 corner{0};
-  glm::uvec2 size{0};
-  std::uint32_t view = 0;
-  std::uint32_t padding = 0;
-};
-
 struct GpuPathLimits {
   double glossy_cutoff = 0.0;
   std::uint32_t max_depth = 0;
@@ -65,6 +56,8 @@ struct GpuLightInput {
   std::uint64_t views = 0;
   std::uint64_t eye_media = 0;
   std::uint64_t counters = 0;
+  std::uint64_t points = 0;
+  std::uint64_t point_lights = 0;
   std::uint64_t random_frame = 0;
   glm::dvec3 background{0.0};
   double ambient = 0.0;
@@ -79,7 +72,18 @@ struct GpuLightInput {
   std::uint32_t max_waiting = kMaxWaiting;
   std::uint32_t padding = 0;
 };
-static_assert(sizeof(GpuLightInput) == 200);
+static_assert(sizeof(GpuLightInput) == 216);
+static_assert(sizeof(EyePoint) == 80 && sizeof(PointLight) == 80);
+
+namespace {
+
+/// As in light_state.glsl.
+struct GpuTile {
+  glm::ivec2 corner{0};
+  glm::uvec2 size{0};
+  std::uint32_t view = 0;
+  std::uint32_t padding = 0;
+};
 
 struct Constants {
   std::uint64_t input;
@@ -153,7 +157,6 @@ void grow_to(const GpuDevice& device, std::optional<GpuBuffer>& buffer, std::siz
 std::string refusal_of_light(const Scene& scene, const RaySettings& settings, std::span<const PassPlan> plan) {
   if (settings.show != Show::Shaded) return "what is shown is no light";
   if (settings.reference) return "the reference is the CPU's";
-  if (settings.denoise) return "the denoiser is the CPU's";
   if (!settings.half_resolution.empty()) return "passes at half resolution are the CPU's";
   if (settings.part) return "rays travel between ranks";
   if (runs_pass(plan, PassId::Gather)) return "gathering by rays is the CPU's";
@@ -212,14 +215,26 @@ void GpuTileShader::grow(std::size_t tiles, std::size_t views) {
   grow_to(device_, read_, tiles * kTilePixels * sizeof(glm::vec4), GpuMemory::Readback);
 }
 
+void GpuTileShader::clear_times() {
+  for (PassTime& step : times_) step.ms = 0.0;
+}
+
+/// Puts the photons of a sample on the device, once.
+void GpuTileShader::hold_photons(const PhotonMaps* maps, const SampleNumber& number) {
+  if (maps == nullptr || held_photons_ == number) return;
+  photons_.put(*maps);
+  held_photons_ = number;
+}
+
+void GpuTileShader::put_view(std::size_t i, const View& view, const Media& media) {
+  views_->mapped<GpuView>()[i] = as_read(view);
+  eye_media_->mapped<Media>()[i] = media;
+}
+
 void GpuTileShader::shade(const TilesToShade& lit, RayCounts& counts, const Store& store) {
   const std::size_t most = device_.info().software ? kSoftwareTiles : kTiles;
-  for (PassTime& step : times_) step.ms = 0.0;
   if (lit.tiles.empty()) return;
-  if (lit.photons != nullptr && held_photons_ != lit.samples.front().number) {
-    photons_.put(*lit.photons);
-    held_photons_ = lit.samples.front().number;
-  }
+  hold_photons(lit.photons, lit.samples.front().number);
   for (const ShadedSample& sample : lit.samples) {
     for (std::size_t first = 0; first < lit.tiles.size(); first += most) {
       if (lit.is_overtaken && lit.is_overtaken()) return;
@@ -245,27 +260,64 @@ void GpuTileShader::finish_batch() {
   }
 }
 
-/// Shades vertex after vertex of all pixels' paths, until none waits, and reads what they add up to; false where that
-/// was overtaken.
-bool GpuTileShader::follow_paths(std::size_t tiles, const TilesToShade& lit) {
+/// Shades vertex after vertex of all pixels' paths, until none waits; false where that was overtaken.
+bool GpuTileShader::follow_paths(std::size_t tiles, bool with_photons, const std::function<bool()>& is_overtaken) {
   std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kCountedPasses.size()];
   run_step(Start, tiles);
   do {
-    if (lit.is_overtaken && lit.is_overtaken()) return false;
+    if (is_overtaken && is_overtaken()) return false;
     waiting = 0;
     for (int round = 0; round < kRounds; ++round) {
       run_step(Vertex, tiles);
       run_step(Direct, tiles);
       run_step(Ambient, tiles);
-      if (lit.photons != nullptr) run_step(Photons, tiles);
+      if (with_photons) run_step(Photons, tiles);
       run_step(Follow, tiles);
     }
     finish_batch();
   } while (waiting > 0);
-  run_step(Finish, tiles);
-  batch_.copy(*pixels_, *read_, tiles * kTilePixels * sizeof(glm::vec4));
-  finish_batch();
   return true;
+}
+
+/// Lights what the input says and reads what it adds up to; false where that was overtaken.
+bool GpuTileShader::light(const GpuLightInput& input, std::size_t tiles, const std::function<bool()>& is_overtaken,
+                          const GpuBuffer& from, const GpuBuffer& to, RayCounts& counts) {
+  input_.mapped<GpuLightInput>()[0] = input;
+  std::ranges::fill(counters_.mapped<std::uint32_t>(), 0U);
+  if (!follow_paths(tiles, input.photons != 0, is_overtaken)) return false;
+  run_step(Finish, tiles);
+  batch_.copy(from, to, std::min(from.bytes(), to.bytes()));
+  finish_batch();
+  for (std::size_t i = 0; i < kCountedPasses.size(); ++i) {
+    counts[kCountedPasses.at(i)] += counters_.mapped<std::uint32_t>()[i];
+  }
+  return true;
+}
+
+/// What all light of the scene has in common.
+GpuLightInput GpuTileShader::input_of(bool with_photons) const {
+  const RaySettings& settings = inputs_.settings;
+  GpuLightInput input{.scene = scene_.address(),
+                      .surfaces = surfaces_.address(),
+                      .materials = materials_.address(),
+                      .lights = lights_.address(),
+                      .photons = with_photons ? photons_.address() : 0,
+                      .tiles = tiles_->address(),
+                      .keys = keys_->address(),
+                      .pixels = pixels_->address(),
+                      .states = states_->address(),
+                      .waiting = waiting_->address(),
+                      .views = views_->address(),
+                      .eye_media = eye_media_->address(),
+                      .counters = counters_.address(),
+                      .ambient = settings.ambient,
+                      .occlusion_reach = occlusion_reach(inputs_.scene),
+                      .limits = limits_of(inputs_),
+                      .light_samples = static_cast<std::uint32_t>(settings.light_samples),
+                      .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
+  input.shadows = runs_pass(inputs_.plan, PassId::Shadow) ? 1 : 0;
+  input.terminator_fix = settings.terminator_fix ? 1 : 0;
+  return input;
 }
 
 void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
@@ -273,10 +325,7 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
   const FrameLayout& layout = sample.keys->layout();
   const RaySettings& settings = inputs_.settings;
   grow(tiles.size(), sample.views.size());
-  for (std::size_t i = 0; i < sample.views.size(); ++i) {
-    views_->mapped<GpuView>()[i] = as_read(sample.views[i]);
-    eye_media_->mapped<Media>()[i] = lit.eyes[i];
-  }
+  for (std::size_t i = 0; i < sample.views.size(); ++i) put_view(i, sample.views[i], lit.eyes[i]);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const TilePlace location = layout.place(tiles[i]);
     tiles_->mapped<GpuTile>()[i] = {{location.pixels.x0, location.pixels.y0},
@@ -290,45 +339,67 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
       if (wanted[pixel] == 0) keys[pixel] = kNoKey;  // nothing of it is stored
     }
   }
-  GpuLightInput input{.scene = scene_.address(),
-                      .surfaces = surfaces_.address(),
-                      .materials = materials_.address(),
-                      .lights = lights_.address(),
-                      .photons = lit.photons != nullptr ? photons_.address() : 0,
-                      .tiles = tiles_->address(),
-                      .keys = keys_->address(),
-                      .pixels = pixels_->address(),
-                      .states = states_->address(),
-                      .waiting = waiting_->address(),
-                      .views = views_->address(),
-                      .eye_media = eye_media_->address(),
-                      .counters = counters_.address(),
-                      .random_frame = frame_stream({settings.seed, sample.number.frame}),
-                      .ambient = settings.ambient,
-                      .occlusion_reach = occlusion_reach(inputs_.scene),
-                      .limits = limits_of(inputs_),
-                      .sample_index = sample.number.sample,
-                      .light_samples = static_cast<std::uint32_t>(settings.light_samples),
-                      .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
+  GpuLightInput input = input_of(lit.photons != nullptr);
+  input.random_frame = frame_stream({settings.seed, sample.number.frame});
+  input.sample_index = sample.number.sample;
   input.shows_environment = settings.background.kind == Background::Kind::Environment ? 1 : 0;
   if (settings.background.kind == Background::Kind::Color) {
     const Rgb& color = settings.background.color;
     input.background = {color.r, color.g, color.b};
   }
-  input.shadows = runs_pass(inputs_.plan, PassId::Shadow) ? 1 : 0;
-  input.terminator_fix = settings.terminator_fix ? 1 : 0;
-  input_.mapped<GpuLightInput>()[0] = input;
-  std::ranges::fill(counters_.mapped<std::uint32_t>(), 0U);
-
-  if (!follow_paths(tiles.size(), lit)) return;
+  if (!light(input, tiles.size(), lit.is_overtaken, *pixels_, *read_, counts)) return;
 
   const std::span<const glm::vec4> pixels = read_->mapped<const glm::vec4>();
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const auto tile = pixels.subspan(i * kTilePixels, kTilePixels);
     store(sample, tiles[i], is_finished(tile) ? tile : std::span<const glm::vec4>());
   }
-  for (std::size_t i = 0; i < kCountedPasses.size(); ++i) {
-    counts[kCountedPasses.at(i)] += counters_.mapped<std::uint32_t>()[i];
+}
+
+/// Points that are lit in place of a tile's pixels.
+struct GpuTileShader::PointBlock {
+  const PointsOfView* group = nullptr;
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+void GpuTileShader::shade_points(const PointsToShade& lit, RayCounts& counts) {
+  hold_photons(lit.photons, lit.number);
+  std::vector<PointBlock> blocks;
+  for (const PointsOfView& group : lit.groups) {
+    for (std::size_t first = 0; first < group.points.size(); first += kTilePixels) {
+      blocks.push_back({&group, first, std::min<std::size_t>(kTilePixels, group.points.size() - first)});
+    }
+  }
+  const std::size_t most = device_.info().software ? kSoftwareTiles : kTiles;
+  for (std::size_t first = 0; first < blocks.size(); first += most) {
+    if (lit.is_overtaken && lit.is_overtaken()) return;
+    shade_blocks(std::span(blocks).subspan(first, std::min(most, blocks.size() - first)), lit, counts);
+  }
+}
+
+void GpuTileShader::shade_blocks(std::span<const PointBlock> blocks, const PointsToShade& lit, RayCounts& counts) {
+  grow(blocks.size(), blocks.size());
+  const std::size_t pixels = blocks.size() * kTilePixels;
+  grow_to(device_, points_, pixels * sizeof(EyePoint), GpuMemory::Upload);
+  grow_to(device_, point_lights_, pixels * sizeof(PointLight), GpuMemory::Device);
+  grow_to(device_, read_lights_, pixels * sizeof(PointLight), GpuMemory::Readback);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const PointBlock& block = blocks[i];
+    put_view(i, *block.group->view, block.group->eye_media);
+    tiles_->mapped<GpuTile>()[i] = {{0, 0}, {kTileSide, kTileSide}, static_cast<std::uint32_t>(i), 0};
+    const std::span<EyePoint> points = points_->mapped<EyePoint>().subspan(i * kTilePixels, kTilePixels);
+    std::ranges::copy(block.group->points.subspan(block.first, block.count), points.begin());
+    std::ranges::fill(points.subspan(block.count), EyePoint{});
+  }
+  GpuLightInput input = input_of(lit.photons != nullptr);
+  input.points = points_->address();
+  input.point_lights = point_lights_->address();
+  if (!light(input, blocks.size(), lit.is_overtaken, *point_lights_, *read_lights_, counts)) return;
+  const std::span<const PointLight> found = read_lights_->mapped<const PointLight>();
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    std::ranges::copy(found.subspan(i * kTilePixels, blocks[i].count),
+                      blocks[i].group->light.subspan(blocks[i].first).begin());
   }
 }
 

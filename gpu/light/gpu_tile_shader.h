@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,6 +22,8 @@
 
 namespace hpr {
 
+struct GpuLightInput;
+
 /// Lights tiles on a device: what DeferredShader does, one thread a pixel (gpu/shaders/light_*.comp). Equal keys get
 /// equal light on devices of one kind, whatever tiles are lit together; that of the CPU differs by rounding.
 class GpuTileShader final : public TileShader {
@@ -30,14 +33,23 @@ class GpuTileShader final : public TileShader {
   GpuTileShader(const GpuDevice& device, const ShadingInputs& inputs, int threads);
 
   void shade(const TilesToShade& lit, RayCounts& counts, const Store& store) override;
+  void shade_points(const PointsToShade& lit, RayCounts& counts) override;
   [[nodiscard]] std::span<const PassTime> times() const override { return times_; }
+  void clear_times() override;
 
  private:
   void compile();
   void run_step(std::size_t step, std::size_t tiles);
   void finish_batch();
   void grow(std::size_t tiles, std::size_t views);
-  [[nodiscard]] bool follow_paths(std::size_t tiles, const TilesToShade& lit);
+  void hold_photons(const PhotonMaps* maps, const SampleNumber& number);
+  void put_view(std::size_t i, const View& view, const Media& media);
+  [[nodiscard]] bool light(const GpuLightInput& input, std::size_t tiles, const std::function<bool()>& is_overtaken,
+                           const GpuBuffer& from, const GpuBuffer& to, RayCounts& counts);
+  [[nodiscard]] bool follow_paths(std::size_t tiles, bool with_photons, const std::function<bool()>& is_overtaken);
+  [[nodiscard]] GpuLightInput input_of(bool with_photons) const;
+  struct PointBlock;
+  void shade_blocks(std::span<const PointBlock> blocks, const PointsToShade& lit, RayCounts& counts);
   void shade_some(const TilesToShade& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
                   RayCounts& counts, const Store& store);
 
@@ -63,6 +75,9 @@ class GpuTileShader final : public TileShader {
   std::optional<GpuBuffer> states_;
   std::optional<GpuBuffer> waiting_;
   std::optional<GpuBuffer> read_;
+  std::optional<GpuBuffer> points_;
+  std::optional<GpuBuffer> point_lights_;
+  std::optional<GpuBuffer> read_lights_;
   GpuBatch batch_;
 };
 

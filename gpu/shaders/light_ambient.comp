@@ -29,7 +29,8 @@ dvec3 ambient_light(PathVertex point) {
 
 void shade() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
-  work.states.states[pixel_index].sum += ambient_light(work.states.states[pixel_index].vertex);
+  PathVertex point = work.states.states[pixel_index].vertex;
+  add_diffuse_light(point.depth, ambient_light(point));
   note_cut_off(false);
 }
 

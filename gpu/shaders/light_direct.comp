@@ -101,6 +101,7 @@ void shade() {
   dvec3 sum = emitted_light(point, found);
   sum += direct_light(work.views.views[tile_of_pixel().view], point);
   work.states.states[pixel_index].sum += sum;
+  if (point.depth == 0u) work.states.states[pixel_index].direct += sum;
   note_cut_off(false);
 }
 

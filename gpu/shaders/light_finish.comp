@@ -8,5 +8,10 @@
 void main() {
   if (!start_pixel()) return;
   PixelState state = work.states.states[pixel_index];
+  if (uint64_t(work.point_lights) != 0ul) {
+    work.point_lights.lights[pixel_index] =
+        PointLight(state.sum, state.diffuse, state.direct, state.nearest, state.is_cut_off);
+    return;
+  }
   work.pixels.pixels[pixel_index] = vec4(state.sum, state.is_cut_off != 0u ? kUnfinished : float(state.covered));
 }

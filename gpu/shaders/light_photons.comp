@@ -14,6 +14,6 @@ void main() {
   bool done = true;
   dvec3 light = gathered_light(PhotonMaps(work.photons), point.surface, point.bsdf, point.material.normal,
                                work.limits.glossy_cutoff, done);
-  work.states.states[pixel_index].sum += point.throughput * light;
+  add_diffuse_light(point.depth, point.throughput * light);
   note_cut_off(!done);
 }

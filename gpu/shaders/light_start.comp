@@ -6,14 +6,46 @@
 #include "light_kernel.glsl"
 #include "all_lights.glsl"
 
+void wait_for_shading(FoundVertex first) {
+  work.waiting.found[pixel_index * work.max_waiting] = first;
+  work.states.states[pixel_index].waiting = 1u;
+  work.states.states[pixel_index].covered = 1u;
+}
+
+// A surface of which the CPU knows that a pixel shows it.
+void start_point(ShadedTile tile) {
+  EyePoint point = work.points.points[pixel_index];
+  if (point.surface == 0xFFFFFFFFu) return;
+  View view = work.views.views[tile.view];
+  FoundVertex first;
+  first.origin = point.origin;
+  first.direction = point.direction;
+  first.throughput = dvec3(point.coverage);
+  first.media = work.eye_media.media[tile.view];
+  first.previous_position = view.eye;
+  first.previous_normal = dvec3(0.0lf);
+  first.previous_pdf = 0.0lf;
+  first.random = point.random;
+  first.surface = point.surface;
+  first.depth = 0u;
+  wait_for_shading(first);
+}
+
 void main() {
   if (!start_pixel()) return;
   ShadedTile tile = tile_of_pixel();
   uvec2 place = pixel_in_tile();
   work.states.states[pixel_index].sum = dvec3(0.0lf);
+  work.states.states[pixel_index].diffuse = dvec3(0.0lf);
+  work.states.states[pixel_index].direct = dvec3(0.0lf);
+  work.states.states[pixel_index].nearest = uintBitsToFloat(0x7F800000u);
   work.states.states[pixel_index].waiting = 0u;
   work.states.states[pixel_index].is_cut_off = 0u;
   work.states.states[pixel_index].covered = 0u;
+  if (uint64_t(work.points) != 0ul) {
+    start_point(tile);
+    return;
+  }
   if (place.x >= tile.size.x || place.y >= tile.size.y) return;
   View view = work.views.views[tile.view];
   uvec2 at = uvec2(tile.corner) + place;
@@ -36,7 +68,5 @@ void main() {
   first.random = make_sampler(pixel_stream(work.random_frame, view.screen_number, view.block + ivec2(at)), work.sample_index);
   first.surface = ~uint(key);
   first.depth = 0u;
-  work.waiting.found[pixel_index * work.max_waiting] = first;
-  work.states.states[pixel_index].waiting = 1u;
-  work.states.states[pixel_index].covered = 1u;
+  wait_for_shading(first);
 }

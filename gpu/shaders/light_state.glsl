@@ -18,6 +18,29 @@ layout(buffer_reference, scalar) readonly buffer Keys {
 layout(buffer_reference, scalar) writeonly buffer ShadedPixels {
   vec4 pixels[];  // radiance, and the share that surfaces cover
 };
+// A surface that a pixel shows: EyePoint in rt/tile_shader.h.
+struct EyePoint {
+  dvec3 origin;
+  dvec3 direction;
+  double coverage;
+  Sampler random;
+  uint surface;
+  uint pixel;
+};
+layout(buffer_reference, scalar) readonly buffer EyePoints {
+  EyePoint points[];
+};
+// What reaches the pixel from there.
+struct PointLight {
+  dvec3 radiance;
+  dvec3 diffuse;
+  dvec3 direct;
+  float nearest;
+  uint is_unfinished;
+};
+layout(buffer_reference, scalar) writeonly buffer PointLights {
+  PointLight lights[];
+};
 layout(buffer_reference, scalar) readonly buffer ViewList {
   View views[];
 };
@@ -31,6 +54,9 @@ layout(buffer_reference, scalar) buffer Counters {
 // Of a pixel.
 struct PixelState {
   dvec3 sum;
+  dvec3 diffuse;  // as PointLight has them
+  dvec3 direct;
+  float nearest;
   uint waiting;     // vertices on its stack
   uint is_shading;  // whether `vertex` is one that it had
   uint is_cut_off;  // a device ended a loop, or more waited than there is room for
@@ -58,6 +84,8 @@ struct LightInput {
   ViewList views;
   MediaList eye_media;  // of each view
   Counters counters;
+  EyePoints points;  // in place of keys, so many as tiles have pixels; null: keys
+  PointLights point_lights;
   uint64_t random_frame;
   dvec3 background;
   double ambient;
@@ -116,6 +144,12 @@ ShadedTile tile_of_pixel() {
 
 uvec2 pixel_in_tile() {
   return uvec2(pixel_index % kTileSide, pixel_index / kTileSide % kTileSide);
+}
+
+// Adds light that a vertex scatters by lobes which no ray follows.
+void add_diffuse_light(uint depth, dvec3 light) {
+  work.states.states[pixel_index].sum += light;
+  if (depth == 0u) work.states.states[pixel_index].diffuse += light;
 }
 
 // Software devices end all loops of a thread after some turns, in silence.

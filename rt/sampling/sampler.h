@@ -42,6 +42,8 @@ class Sampler {
 
   /// A sampler for one of the ways a path goes on from here, whose numbers have nothing to do with those drawn here.
   [[nodiscard]] Sampler branch(std::uint32_t which) const;
+  /// As it was before the first draw.
+  [[nodiscard]] Sampler restarted() const { return {stream_, index_}; }
 
  private:
   [[nodiscard]] std::uint64_t next_key();
