@@ -10,6 +10,7 @@
 #include <optional>
 #include <random>
 
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 namespace hpr {
@@ -29,23 +30,7 @@ Light point_light(const glm::dvec3& position, float intensity) {
 }
 
 TEST(DeferredShader, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {
-  Scene scene = white_floor();
-  scene.lights = {point_light({0.1, 2.0, 0.1}, 7.0F)};
-  // Narrow, and with the light near the eye's axis: there the specular layer's share is below 1e-7.
-  const View view = test::view_from({0, 5, 0.1}, {0, 0, 0}, {65, 33}, scene, 0.1);
-  const test::Shaded lit = test::shade(scene, view);
-  for (int y = 0; y < 33; ++y) {
-    for (int x = 0; x < 65; ++x) {
-      const Ray ray = view_ray(view, x + 0.5, y + 0.5);
-      const glm::dvec3 p = ray.origin - ray.direction * (ray.origin.y / ray.direction.y);
-      const glm::dvec3 offset = scene.lights[0].position - p;
-      const double d2 = glm::dot(offset, offset);
-      const double expected = 7.0 * (offset.y / std::sqrt(d2)) / (std::numbers::pi * d2);
-      ASSERT_NEAR(lit.image.at(x, y).g / expected, 1.0, 1e-6) << x << ',' << y;
-    }
-  }
-  EXPECT_EQ(lit.counts[PassId::Shadow], 65U * 33U);
-  EXPECT_EQ(lit.counts.not_finite, 0U);
+  test::expect_light_of_a_point();
 }
 
 TEST(DeferredShader, ABlockersShadowEndsWhereGeometrySays) {
@@ -99,29 +84,7 @@ TEST(DeferredShader, ALightNearerThanRoundingCastsNoImpossibleRay) {
 
 TEST(DeferredShader, NoSphereShadowsItselfAtAnyScale) {
   for (const double scale : {1e-9, 1e-3, 1.0, 1e3, 1e9}) {
-    for (const double offset : {0.0, 100.0}) {
-      Scene scene;
-      add_material(scene, test::diffuse());
-      const std::uint32_t ball = add_mesh(scene, test::sphere(1.0, 16, 0));
-      const glm::dvec3 center = scale * offset * glm::dvec3(1.0, 0.5, -0.3);
-      place_mesh(scene, ball, glm::scale(glm::translate(glm::dmat4(1.0), center), glm::dvec3(scale)));
-      finish_scene(scene);
-      Light sun;
-      sun.type = LightType::Directional;
-      sun.direction = glm::normalize(glm::vec3(-0.8F, -0.5F, -0.2F));
-      scene.lights.assign(8, sun);
-      const View view = test::view_from(center + glm::dvec3(0, 0, 4.0 * scale), center, {64, 64}, scene, 0.6);
-      const test::Shaded lit = test::shade(scene, view);
-      const test::Shaded unshadowed = test::shade(scene, view, {.auto_passes = false});
-      int differing = 0;
-      int lit_pixels = 0;
-      for (std::size_t i = 0; i < lit.image.pixels().size(); ++i) {
-        differing += lit.image.pixels()[i] == unshadowed.image.pixels()[i] ? 0 : 1;
-        lit_pixels += unshadowed.image.pixels()[i].r > 0.0F ? 1 : 0;
-      }
-      EXPECT_EQ(differing, 0) << scale << ' ' << offset;
-      EXPECT_GT(lit_pixels, 500);
-    }
+    for (const double offset : {0.0, 100.0}) test::expect_no_shadow_on_itself(scale, offset);
   }
 }
 

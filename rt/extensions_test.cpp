@@ -9,15 +9,8 @@
 namespace hpr {
 namespace {
 
-using test::mean_of;
-
 void expect_the_same_light(const Material& thing, bool is_sheet = false) {
-  const Scene scene = test::room(thing, is_sheet);
-  const View view = test::view_from({0, 0, 0.95}, {0, -0.25, -1}, {12, 12}, scene, 1.3);
-  const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 32, .terminator_fix = false, .reference = true}, 256);
-  const glm::dvec3 hybrid =
-      mean_of(scene, view, {.max_depth = 24, .photons = 10'000, .global_photons = true, .terminator_fix = false}, 16);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(hybrid[c] / reference[c], 1.0, 0.04) << "channel " << c;
+  test::expect_light_of_reference(test::room(thing, is_sheet));
 }
 
 Material with(Material material, const std::function<void(MaterialExtensions&)>& set) {

@@ -9,6 +9,7 @@
 #include "image/key.h"
 #include "image/tiles.h"
 #include "rt/deferred_shader.h"
+#include "scene/requirements.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
@@ -180,10 +181,11 @@ struct Shaded {
   RayCounts counts;
 };
 
-inline Shaded shade(const Scene& scene, const View& view, const RaySettings& settings = {}) {
+inline Shaded shade(const Scene& scene, const View& view, const RaySettings& settings = {},
+                    const MakeTileShader& make_device = {}) {
   const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
   TileLayer<Rgb> radiance(keys.layout());
-  DeferredShader shader(scene, settings);
+  DeferredShader shader(scene, settings, requirements_of(scene), {}, nullptr, make_device);
   shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance});
   return {to_image(radiance, 0), shader.counts()};
 }
@@ -197,9 +199,9 @@ inline double mean(const Image<Rgb>& image) {
 
 /// The mean of a pixel over many samples.
 inline glm::dvec3 mean_pixel(const Scene& scene, const View& view, int x, int y, std::uint32_t samples,
-                             const RaySettings& settings = {}) {
+                             const RaySettings& settings = {}, const MakeTileShader& make_device = {}) {
   const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
-  DeferredShader shader(scene, settings);
+  DeferredShader shader(scene, settings, requirements_of(scene), {}, nullptr, make_device);
   glm::dvec3 sum(0.0);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     TileLayer<Rgb> radiance(keys.layout());

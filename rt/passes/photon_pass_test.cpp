@@ -174,24 +174,7 @@ TEST(PhotonPass, PhotonsOvertakenOnAnyRankAreDroppedOnAllAndTracedAgainWithTheSa
 }
 
 TEST(PhotonPass, LightOfAnyStrengthAndSizeIsTheSameButForItsUnit) {
-  const RaySettings settings{.photons = 5'000, .global_photons = true};
-  const auto picture = [&](int strength, int size) {
-    const double scale = std::ldexp(1.0, size);
-    const Scene scene = furnace(0.5F, std::ldexp(1.0F, strength), static_cast<float>(scale));
-    const View view = test::view_from({0, 0, 0.5 * scale}, {0.1 * scale, 0.2 * scale, -scale}, {8, 8}, scene, 0.5);
-    const TileLayer<Key> keys = test::cast_keys(scene, std::span(&view, 1));
-    TileLayer<Rgb> lit(keys.layout());
-    DeferredShader shader(scene, settings);
-    shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &lit});
-    std::vector<float> green;
-    for (const Rgb& color : lit.tile(0)) green.push_back(std::ldexp(color.g, -strength));
-    return green;
-  };
-  const std::vector<float> one = picture(0, 0);
-  EXPECT_GT(one.front(), 1.5F);
-  // In watts most of these photons would lie outside of what floats reach, 2^-126 to 2^127.
-  EXPECT_EQ(picture(-110, -5), one);
-  EXPECT_EQ(picture(100, 25), one);
+  test::expect_light_of_any_strength_and_size();
 }
 
 TEST(PhotonPass, SendsNothingWhereNobodyAsksAndNoCausticsWhereNothingBundlesLight) {

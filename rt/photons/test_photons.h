@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -59,6 +61,33 @@ inline Scene furnace(float albedo, float emission, float size = 1.0F) {
   side({-1, 1, -1}, {2, 0, 0}, {0, 0, 2});
   finish_scene(scene);
   return scene;
+}
+
+/// Expects the sum of all reflections in a closed box that emits 1: 1 / (1 - albedo).
+inline void expect_light_of_series(double albedo, const RaySettings& settings, std::uint32_t samples,
+                                   const MakeTileShader& make_device = {}) {
+  const Scene scene = furnace(static_cast<float>(albedo), 1.0F);
+  const View view = view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {8, 8}, scene, 0.5);
+  const glm::dvec3 mean = mean_pixel(scene, view, 4, 4, samples, settings, make_device);
+  EXPECT_NEAR(mean.g * (1.0 - albedo), 1.0, 0.02) << "albedo " << albedo;
+}
+
+/// Expects one picture of a closed box of any size that emits as much as is wanted, in units of what it emits.
+inline void expect_light_of_any_strength_and_size(const MakeTileShader& make_device = {}) {
+  const auto picture = [&](int strength, int size) {
+    const double scale = std::ldexp(1.0, size);
+    const Scene scene = furnace(0.5F, std::ldexp(1.0F, strength), static_cast<float>(scale));
+    const View view = view_from({0, 0, 0.5 * scale}, {0.1 * scale, 0.2 * scale, -scale}, {8, 8}, scene, 0.5);
+    const Shaded lit = shade(scene, view, {.photons = 5'000, .global_photons = true}, make_device);
+    std::vector<float> green;
+    for (const Rgb& color : lit.image.pixels()) green.push_back(std::ldexp(color.g, -strength));
+    return green;
+  };
+  const std::vector<float> one = picture(0, 0);
+  EXPECT_GT(one.front(), 1.5F);
+  // In watts most of these photons would lie outside of what floats reach, 2^-126 to 2^127.
+  EXPECT_EQ(picture(-110, -5), one);
+  EXPECT_EQ(picture(100, 25), one);
 }
 
 /// A scene with all that photons need.
