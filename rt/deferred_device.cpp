@@ -1,6 +1,12 @@
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <glm/geometric.hpp>
+#include <memory>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "core/timing.h"
 #include "rt/deferred_state.h"
@@ -48,57 +54,55 @@ struct FilteredTile {
 }  // namespace
 
 /// Some tiles whose samples are denoised, from what they show to what is stored.
-struct DeferredShader::State::FilteredTiles {
-  State& state;
-  const Call& call;
-  const TilesToShade& lit;
-  RayCounts& traced;
-  double& device_ms;
-  std::vector<FilteredTile> tiles = {};
-  std::vector<std::size_t> left = {};  ///< that the device could not finish
+class DeferredShader::State::FilteredTiles {
+ public:
+  FilteredTiles(State& state, const Call& call, DeviceWork& done) : state_(state), call_(call), done_(done) {}
 
-  void for_each(const std::function<void(FilteredTile&)>& body) {
-    state.for_each(tiles.size(), [&](std::size_t i) {
-      const DenormalsAsZero mode;
-      body(tiles[i]);
-    });
-  }
-
-  void shade(std::span<const std::size_t> indices) {
+  /// Returns those that the device could not finish.
+  [[nodiscard]] std::vector<std::size_t> shade(std::span<const std::size_t> indices) {
     for (const std::size_t index : indices) start(index);
     for_each([this](FilteredTile& tile) { find_points(tile); });
     light();
-    const std::span<const ShadedSample> samples = lit.samples;
-    for (std::size_t sample = 0; sample < samples.size() && state.denoises(samples[sample].number); ++sample) {
+    const std::span<const ShadedSample> samples = call_.samples;
+    for (std::size_t sample = 0; sample < samples.size() && state_.denoises(samples[sample].number); ++sample) {
+      if (call_.overtaken()) break;
       for_each([&](FilteredTile& tile) { resample(tile, sample); });
       light();
       for_each([&](FilteredTile& tile) { resolve(tile, sample); });
     }
     for_each([this](FilteredTile& tile) { store(tile); });
-    for (FilteredTile& tile : tiles) state.tile_memory.put_back(std::move(tile.scratch));
-    tiles.clear();
+    for (FilteredTile& tile : tiles_) state_.tile_memory.put_back(std::move(tile.scratch));
+    tiles_.clear();
+    return std::exchange(left_, {});
   }
 
  private:
+  void for_each(const std::function<void(FilteredTile&)>& body) {
+    state_.for_each(tiles_.size(), [&](std::size_t i) {
+      const DenormalsAsZero mode;
+      body(tiles_[i]);
+    });
+  }
+
   void start(std::size_t index) {
-    const ShadedSample& first = lit.samples.front();
+    const ShadedSample& first = call_.samples.front();
     if (!wants_any(mask_of(first.wanted, index))) return;
-    for (const ShadedSample& sample : lit.samples) set_active(sample.output, index);
+    for (const ShadedSample& sample : call_.samples) set_active(sample.output, index);
     const std::size_t screen = first.keys->layout().place(index).screen;
-    tiles.push_back({index, state.jobs_of(call, {.tile = index}), state.context_of(call, screen),
-                     state.tile_memory.take(state.steps())});
+    tiles_.push_back({index, state_.jobs_of(call_, {.tile = index}), state_.context_of(call_, screen),
+                      state_.tile_memory.take(state_.steps())});
   }
 
   void find_points(FilteredTile& tile) const {
-    const TilePart part{tile.jobs, lit.samples, tile.index, true};
+    const TilePart part{tile.jobs, call_.samples, tile.index, true};
     TileScratch& scratch = *tile.scratch;
-    state.start_tile(tile.context, scratch, part,
-                     [&](const std::vector<PathVertex>& points) { tile.add_points(points); });
+    state_.start_tile(tile.context, scratch, part,
+                      [&](const std::vector<PathVertex>& points) { tile.add_points(points); });
     std::vector<PathVertex> points;
     for (std::size_t sample = 0; sample < tile.jobs.size(); ++sample) {
       points.clear();
       const RowRange rows{0, tile.jobs[sample].end_row()};
-      state.find_rows(tile.context, scratch, scratch.own, part, sample, rows, points);
+      state_.find_rows(tile.context, scratch, scratch.own, part, sample, rows, points);
       tile.add_points(points);
     }
   }
@@ -107,30 +111,31 @@ struct DeferredShader::State::FilteredTiles {
   void light() {
     const Stopwatch watch;
     std::vector<PointsOfView> groups;
-    for (FilteredTile& tile : tiles) {
+    for (FilteredTile& tile : tiles_) {
       tile.light.assign(tile.points.size(), PointLight{});
       if (!tile.points.empty()) groups.push_back({tile.context.view, tile.context.eye_media, tile.points, tile.light});
     }
     {
       const trace::Span span("light, on the device");
-      state.device->shade_points({groups, lit.samples.front().number, lit.photons, lit.is_overtaken}, traced);
+      state_.device->shade_points({groups, call_.samples.front().number, call_.photons, call_.is_overtaken},
+                                  done_.traced);
     }
-    device_ms += watch.ms();
+    done_.ms += watch.ms();
     leave_unfinished();
     for_each([](FilteredTile& tile) { tile.add_light(); });
   }
 
   void leave_unfinished() {
     std::vector<FilteredTile> finished;
-    for (FilteredTile& tile : tiles) {
+    for (FilteredTile& tile : tiles_) {
       if (std::ranges::all_of(tile.light, [](const PointLight& light) { return light.is_unfinished == 0; })) {
         finished.push_back(std::move(tile));
       } else {
-        left.push_back(tile.index);
-        state.tile_memory.put_back(std::move(tile.scratch));
+        left_.push_back(tile.index);
+        state_.tile_memory.put_back(std::move(tile.scratch));
       }
     }
-    tiles.swap(finished);
+    tiles_.swap(finished);
   }
 
   void resample(FilteredTile& tile, std::size_t sample) const {
@@ -138,7 +143,7 @@ struct DeferredShader::State::FilteredTiles {
     TileScratch& scratch = *tile.scratch;
     if (sample == 0) {
       tile.fragments =
-          &state.fragments.of_tile(tile.context, scratch.own.buffers, tile.jobs.front(), tile.index, scratch.finder);
+          &state_.fragments.of_tile(tile.context, scratch.own.buffers, tile.jobs.front(), tile.index, scratch.finder);
     }
     scratch.denoiser.resample_edges(tile.context, tile.jobs[sample], margin_of(scratch, sample), *tile.fragments,
                                     scratch.own.buffers, scratch.sums, scratch.points);
@@ -157,33 +162,41 @@ struct DeferredShader::State::FilteredTiles {
   void store(const FilteredTile& tile) const {
     TileScratch& scratch = *tile.scratch;
     for (std::size_t i = 0; i < tile.jobs.size(); ++i) {
-      scratch.sums.store(tile.jobs[i], tile.index, lit.samples[i].output, scratch.own.buffers.counts);
+      scratch.sums.store(tile.jobs[i], tile.index, call_.samples[i].output, scratch.own.buffers.counts);
     }
   }
+
+  State& state_;
+  const Call& call_;
+  DeviceWork& done_;
+  std::vector<FilteredTile> tiles_ = {};
+  std::vector<std::size_t> left_ = {};
 };
 
-std::vector<std::size_t> DeferredShader::State::light_by_device(const Call& call, const TilesToShade& lit,
-                                                                RayCounts& traced, double& device_ms) {
-  const ShadedSample& first = lit.samples.front();
-  if (!device || !wants_light_alone(first.output)) return {lit.tiles.begin(), lit.tiles.end()};
+std::vector<std::size_t> DeferredShader::State::light_by_device(const Call& call, std::span<const std::size_t> tiles,
+                                                                DeviceWork& done) {
+  const ShadedSample& first = call.samples.front();
+  if (!device || !wants_light_alone(first.output)) return {tiles.begin(), tiles.end()};
   device->clear_times();
-  if (denoises(first.number)) return light_filtered(call, lit, traced, device_ms);
+  if (denoises(first.number)) return light_filtered(call, tiles, done);
   const Stopwatch watch;
-  std::vector<std::size_t> left = shade_on_device(*device, lit, traced);
-  device_ms += watch.ms();
+  std::vector<std::size_t> left =
+      shade_on_device(*device, {call.samples, tiles, call.eyes, call.photons, call.is_overtaken}, done.traced);
+  done.ms += watch.ms();
   return left;
 }
 
-std::vector<std::size_t> DeferredShader::State::light_filtered(const Call& call, const TilesToShade& lit,
-                                                               RayCounts& traced, double& device_ms) {
+std::vector<std::size_t> DeferredShader::State::light_filtered(const Call& call, std::span<const std::size_t> tiles,
+                                                               DeviceWork& done) {
   const auto threads = static_cast<std::size_t>(std::max(settings.threads, 1));
   const std::size_t most = std::max(kFilteredTiles, kFilteredTilesOfThread * threads);
-  FilteredTiles filtered{*this, call, lit, traced, device_ms};
-  for (std::size_t first = 0; first < lit.tiles.size(); first += most) {
-    if (lit.is_overtaken && lit.is_overtaken()) break;
-    filtered.shade(lit.tiles.subspan(first, std::min(most, lit.tiles.size() - first)));
+  FilteredTiles filtered(*this, call, done);
+  std::vector<std::size_t> left;
+  for (std::size_t first = 0; first < tiles.size() && !call.overtaken(); first += most) {
+    const std::vector<std::size_t> some = filtered.shade(tiles.subspan(first, std::min(most, tiles.size() - first)));
+    left.insert(left.end(), some.begin(), some.end());
   }
-  return filtered.left;
+  return left;
 }
 
 }  // namespace hpr

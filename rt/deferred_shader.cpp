@@ -455,10 +455,11 @@ void DeferredShader::shade(std::span<const View> views, const TileLayer<Key>& ke
   shade(std::span(&only, 1), tiles);
 }
 
-DeferredShader::State::Call DeferredShader::State::start_call(std::span<const ShadedSample> samples) {
+DeferredShader::State::Call DeferredShader::State::start_call(std::span<const ShadedSample> samples,
+                                                              const std::function<bool()>& is_overtaken) {
   const ShadedSample& first = samples.front();
   costs.clear();
-  Call call{samples, photon_maps(first.number), media.of_eyes(first.views)};
+  Call call{samples, photon_maps(first.number), media.of_eyes(first.views), is_overtaken};
   if (settings.denoise) fragments.prepare(first.keys->layout(), first.views, settings);
   return call;
 }
@@ -525,24 +526,22 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
     state.warn_of_cut_rays();
     return;
   }
-  const State::Call call = state.start_call(samples);
+  const State::Call call = state.start_call(samples, is_overtaken);
   const Stopwatch watch;
-  RayCounts traced;
-  double device_ms = 0.0;
-  const std::vector<std::size_t> left =
-      state.light_by_device(call, {samples, tiles, call.eyes, call.photons, is_overtaken}, traced, device_ms);
+  State::DeviceWork done;
+  const std::vector<std::size_t> left = state.light_by_device(call, tiles, done);
   const double before_ms = watch.ms() * state.settings.threads;
   const std::vector<std::size_t> order = fullest_first(left, *first.keys, state.settings.threads);
   state.for_each(order.size(), [&](std::size_t i) {
-    if (is_overtaken && is_overtaken()) return;
+    if (call.overtaken()) return;
     if (!wants_any(mask_of(first.wanted, order[i]))) return;
     for (const ShadedSample& sample : samples) set_active(sample.output, order[i]);
     state.shade_part(call, {.tile = order[i]});
   });
   state.gather_counts(watch.ms() * state.settings.threads);
   if (!state.device) return;
-  state.counts += traced;
-  add_times(*state.device, device_ms * state.settings.threads, state.settings.threads, state.times);
+  state.counts += done.traced;
+  add_times(*state.device, done.ms * state.settings.threads, state.settings.threads, state.times);
   for (const std::size_t tile : tiles) state.costs.push_back({tile, before_ms / static_cast<double>(tiles.size())});
 }
 
@@ -550,7 +549,8 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart
   HPR_CHECK(!is_whole() && (samples.size() == 1 || (!samples.empty() && !shades_one_by_one())));
   check_sizes(samples);
   State& state = *state_;
-  const State::Call call = state.start_call(samples);
+  const std::function<bool()> never;
+  const State::Call call = state.start_call(samples, never);
   const Stopwatch watch;
   const auto threads = static_cast<std::size_t>(std::max(state.settings.threads, 1));
   parallel_for(state.settings.threads, threads, [&](std::size_t) {

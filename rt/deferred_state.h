@@ -112,8 +112,16 @@ struct DeferredShader::State {
     std::span<const ShadedSample> samples;
     const PhotonMaps* photons = nullptr;
     std::vector<Media> eyes;
+    const std::function<bool()>& is_overtaken;
+
+    [[nodiscard]] bool overtaken() const { return is_overtaken && is_overtaken(); }
   };
-  [[nodiscard]] Call start_call(std::span<const ShadedSample> samples);
+  /// What a device did.
+  struct DeviceWork {
+    RayCounts traced;
+    double ms = 0.0;  ///< that it alone took
+  };
+  [[nodiscard]] Call start_call(std::span<const ShadedSample> samples, const std::function<bool()>& is_overtaken);
   [[nodiscard]] std::vector<TileJob> jobs_of(const Call& call, const ShadedPart& part) const;
   [[nodiscard]] LightContext context_of(const Call& call, std::size_t screen) const;
   void shade_part(const Call& call, const ShadedPart& part);
@@ -123,13 +131,13 @@ struct DeferredShader::State {
     return settings.denoise && number.sample < kDenoisedSamples;
   }
   /// Lights what the device can and returns the tiles that are left to the CPU, of all samples.
-  [[nodiscard]] std::vector<std::size_t> light_by_device(const Call& call, const TilesToShade& lit, RayCounts& traced,
-                                                         double& device_ms);
-  /// As shade_on_device(), of samples that are denoised: the CPU finds what pixels show and filters light, the device
-  /// makes it. Adds what the device alone took to `device_ms`.
-  [[nodiscard]] std::vector<std::size_t> light_filtered(const Call& call, const TilesToShade& lit, RayCounts& traced,
-                                                        double& device_ms);
-  struct FilteredTiles;
+  [[nodiscard]] std::vector<std::size_t> light_by_device(const Call& call, std::span<const std::size_t> tiles,
+                                                         DeviceWork& done);
+  /// Lights samples that are denoised, and returns what is left: the CPU finds what pixels show and filters light, the
+  /// device makes it.
+  [[nodiscard]] std::vector<std::size_t> light_filtered(const Call& call, std::span<const std::size_t> tiles,
+                                                        DeviceWork& done);
+  class FilteredTiles;
   void shade_rows(const LightContext& context, TileScratch& scratch, WaveScratch& memory, const TilePart& part,
                   const RowRange& rows) const;
   void shade_points(const LightContext& context, TileScratch& scratch);

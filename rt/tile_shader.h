@@ -18,6 +18,7 @@
 #include "rt/ray_counts.h"
 #include "rt/ray_settings.h"
 #include "rt/sampling/sampler.h"
+#include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
 #include "scene/scene.h"
 
@@ -51,7 +52,7 @@ struct EyePoint {
   glm::dvec3 direction{0.0};
   double coverage = 1.0;  ///< of the pixel
   Sampler sampler;        ///< before the first draw
-  std::uint32_t surface = 0xFFFFFFFFU;
+  std::uint32_t surface = kNoSurface;
   std::uint32_t pixel = 0;  ///< index into PixelSums
 };
 
@@ -103,8 +104,7 @@ class TileShader {
 /// Whether only light is stored, and no layer of what it is made of.
 [[nodiscard]] bool wants_light_alone(const LightOutput& output);
 
-/// Lights what the device can and adds the rays it traced. Returns the tiles that are left to the CPU,
-/// of all samples.
+/// Lights what the device can and adds the rays it traced. Returns the tiles that are left to the CPU, of all samples.
 [[nodiscard]] std::vector<std::size_t> shade_on_device(TileShader& device, const TilesToShade& lit, RayCounts& traced);
 
 /// Adds the steps of the device, of which everything took so many ms: those of threads, all together.

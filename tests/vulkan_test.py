@@ -100,7 +100,10 @@ def said_and_done(folder):
     hpr(folder, "render", "gen:cornell", "-o", "few-gpu.exr", "--backend", "vulkan", *few)
     nearly_equal(folder, "few.exr", "few-gpu.exr", "adaptive samples", allowed=1e-3)
     drawn = ("--primary", "raster", "--depth-format", "24")
-    expect(render(folder, "gen:cornell", *drawn, "--backend", "vulkan")[0] == render(folder, "gen:cornell", *drawn)[0], "OpenGL beside Vulkan")
+    keys = render(folder, "gen:cornell", *drawn, "--backend", "vulkan")[0]
+    (folder / "a.exr").rename(folder / "lit.exr")
+    expect(render(folder, "gen:cornell", *drawn)[0] == keys, "OpenGL beside Vulkan")
+    nearly_equal(folder, "a.exr", "lit.exr", "OpenGL's keys lit by a device")
     said = hpr(folder, "render", "gen:gallery", "--size", "128x96", "-o", "d.png", "--backend", "vulkan", "--ranks", "3", "--distribute", "sort-last",
                "--verify", "100", *draft, "--spp", "1")
     expect("differ" not in said.stderr, f"drawn again, keys are others: {said.stderr[-800:]}")

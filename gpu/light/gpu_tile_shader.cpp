@@ -31,17 +31,15 @@
 #include "rt/sampling/sampler.h"
 
 namespace hpr {
-/// Vertices of a pixel that may wait: two surfaces that a path begins with may split into all lobes and channels, what
-/// comes after does not.
-static constexpr std::uint32_t kMaxWaiting = 12;
 
-/// As in light_state.glsl.
+/// As in path.glsl.
 struct GpuPathLimits {
   double glossy_cutoff = 0.0;
   std::uint32_t max_depth = 0;
   std::uint32_t followed = 0;
 };
 
+/// As in light_state.glsl.
 struct GpuLightInput {
   std::uint64_t scene = 0;
   std::uint64_t surfaces = 0;
@@ -69,13 +67,17 @@ struct GpuLightInput {
   std::uint32_t occlusion_rays = 0;
   std::uint32_t shadows = 0;
   std::uint32_t terminator_fix = 0;
-  std::uint32_t max_waiting = kMaxWaiting;
+  std::uint32_t max_waiting = 0;
   std::uint32_t padding = 0;
 };
 static_assert(sizeof(GpuLightInput) == 216);
 static_assert(sizeof(EyePoint) == 80 && sizeof(PointLight) == 80);
 
 namespace {
+
+/// Vertices of a pixel that may wait: two surfaces that a path begins with may split into all lobes and channels, what
+/// comes after does not.
+constexpr std::uint32_t kMaxWaiting = 12;
 
 /// As in light_state.glsl.
 struct GpuTile {
@@ -208,11 +210,8 @@ void GpuTileShader::grow(std::size_t tiles, std::size_t views) {
   grow_to(device_, views_, views * sizeof(GpuView), GpuMemory::Upload);
   grow_to(device_, eye_media_, views * sizeof(Media), GpuMemory::Upload);
   grow_to(device_, tiles_, tiles * sizeof(GpuTile), GpuMemory::Upload);
-  grow_to(device_, keys_, tiles * kTilePixels * sizeof(Key), GpuMemory::Upload);
-  grow_to(device_, pixels_, tiles * kTilePixels * sizeof(glm::vec4), GpuMemory::Device);
   grow_to(device_, states_, tiles * kTilePixels * state_bytes_, GpuMemory::Device);
   grow_to(device_, waiting_, tiles * kTilePixels * waiting_bytes_, GpuMemory::Device);
-  grow_to(device_, read_, tiles * kTilePixels * sizeof(glm::vec4), GpuMemory::Readback);
 }
 
 void GpuTileShader::clear_times() {
@@ -264,8 +263,7 @@ void GpuTileShader::finish_batch() {
 bool GpuTileShader::follow_paths(std::size_t tiles, bool with_photons, const std::function<bool()>& is_overtaken) {
   std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kCountedPasses.size()];
   run_step(Start, tiles);
-  do {
-    if (is_overtaken && is_overtaken()) return false;
+  while (true) {
     waiting = 0;
     for (int round = 0; round < kRounds; ++round) {
       run_step(Vertex, tiles);
@@ -275,18 +273,23 @@ bool GpuTileShader::follow_paths(std::size_t tiles, bool with_photons, const std
       run_step(Follow, tiles);
     }
     finish_batch();
-  } while (waiting > 0);
-  return true;
+    if (waiting == 0) return true;
+    if (is_overtaken && is_overtaken()) return false;
+  }
 }
 
 /// Lights what the input says and reads what it adds up to; false where that was overtaken.
 bool GpuTileShader::light(const GpuLightInput& input, std::size_t tiles, const std::function<bool()>& is_overtaken,
-                          const GpuBuffer& from, const GpuBuffer& to, RayCounts& counts) {
+                          RayCounts& counts) {
   input_.mapped<GpuLightInput>()[0] = input;
   std::ranges::fill(counters_.mapped<std::uint32_t>(), 0U);
   if (!follow_paths(tiles, input.photons != 0, is_overtaken)) return false;
   run_step(Finish, tiles);
-  batch_.copy(from, to, std::min(from.bytes(), to.bytes()));
+  if (input.points != 0) {
+    batch_.copy(*point_lights_, *read_lights_, tiles * kTilePixels * sizeof(PointLight));
+  } else {
+    batch_.copy(*pixels_, *read_, tiles * kTilePixels * sizeof(glm::vec4));
+  }
   finish_batch();
   for (std::size_t i = 0; i < kCountedPasses.size(); ++i) {
     counts[kCountedPasses.at(i)] += counters_.mapped<std::uint32_t>()[i];
@@ -303,8 +306,6 @@ GpuLightInput GpuTileShader::input_of(bool with_photons) const {
                       .lights = lights_.address(),
                       .photons = with_photons ? photons_.address() : 0,
                       .tiles = tiles_->address(),
-                      .keys = keys_->address(),
-                      .pixels = pixels_->address(),
                       .states = states_->address(),
                       .waiting = waiting_->address(),
                       .views = views_->address(),
@@ -317,6 +318,7 @@ GpuLightInput GpuTileShader::input_of(bool with_photons) const {
                       .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
   input.shadows = runs_pass(inputs_.plan, PassId::Shadow) ? 1 : 0;
   input.terminator_fix = settings.terminator_fix ? 1 : 0;
+  input.max_waiting = kMaxWaiting;
   return input;
 }
 
@@ -325,6 +327,10 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
   const FrameLayout& layout = sample.keys->layout();
   const RaySettings& settings = inputs_.settings;
   grow(tiles.size(), sample.views.size());
+  const std::size_t pixel_count = tiles.size() * kTilePixels;
+  grow_to(device_, keys_, pixel_count * sizeof(Key), GpuMemory::Upload);
+  grow_to(device_, pixels_, pixel_count * sizeof(glm::vec4), GpuMemory::Device);
+  grow_to(device_, read_, pixel_count * sizeof(glm::vec4), GpuMemory::Readback);
   for (std::size_t i = 0; i < sample.views.size(); ++i) put_view(i, sample.views[i], lit.eyes[i]);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const TilePlace location = layout.place(tiles[i]);
@@ -340,6 +346,8 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
     }
   }
   GpuLightInput input = input_of(lit.photons != nullptr);
+  input.keys = keys_->address();
+  input.pixels = pixels_->address();
   input.random_frame = frame_stream({settings.seed, sample.number.frame});
   input.sample_index = sample.number.sample;
   input.shows_environment = settings.background.kind == Background::Kind::Environment ? 1 : 0;
@@ -347,7 +355,7 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
     const Rgb& color = settings.background.color;
     input.background = {color.r, color.g, color.b};
   }
-  if (!light(input, tiles.size(), lit.is_overtaken, *pixels_, *read_, counts)) return;
+  if (!light(input, tiles.size(), lit.is_overtaken, counts)) return;
 
   const std::span<const glm::vec4> pixels = read_->mapped<const glm::vec4>();
   for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -395,7 +403,7 @@ void GpuTileShader::shade_blocks(std::span<const PointBlock> blocks, const Point
   GpuLightInput input = input_of(lit.photons != nullptr);
   input.points = points_->address();
   input.point_lights = point_lights_->address();
-  if (!light(input, blocks.size(), lit.is_overtaken, *point_lights_, *read_lights_, counts)) return;
+  if (!light(input, blocks.size(), lit.is_overtaken, counts)) return;
   const std::span<const PointLight> found = read_lights_->mapped<const PointLight>();
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     std::ranges::copy(found.subspan(i * kTilePixels, blocks[i].count),

@@ -45,7 +45,7 @@ class GpuTileShader final : public TileShader {
   void hold_photons(const PhotonMaps* maps, const SampleNumber& number);
   void put_view(std::size_t i, const View& view, const Media& media);
   [[nodiscard]] bool light(const GpuLightInput& input, std::size_t tiles, const std::function<bool()>& is_overtaken,
-                           const GpuBuffer& from, const GpuBuffer& to, RayCounts& counts);
+                           RayCounts& counts);
   [[nodiscard]] bool follow_paths(std::size_t tiles, bool with_photons, const std::function<bool()>& is_overtaken);
   [[nodiscard]] GpuLightInput input_of(bool with_photons) const;
   struct PointBlock;

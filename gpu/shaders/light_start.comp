@@ -6,29 +6,29 @@
 #include "light_kernel.glsl"
 #include "all_lights.glsl"
 
-void wait_for_shading(FoundVertex first) {
+// Has the pixel's first vertex wait: that on `surface`, which a ray meets.
+void start_path(uint view, Ray ray, double coverage, Sampler random, uint surface) {
+  FoundVertex first;
+  first.origin = ray.origin;
+  first.direction = ray.direction;
+  first.throughput = dvec3(coverage);
+  first.media = work.eye_media.media[view];
+  first.previous_position = work.views.views[view].eye;
+  first.previous_normal = dvec3(0.0lf);
+  first.previous_pdf = 0.0lf;
+  first.random = random;
+  first.surface = surface;
+  first.depth = 0u;
   work.waiting.found[pixel_index * work.max_waiting] = first;
   work.states.states[pixel_index].waiting = 1u;
   work.states.states[pixel_index].covered = 1u;
 }
 
 // A surface of which the CPU knows that a pixel shows it.
-void start_point(ShadedTile tile) {
+void start_point(uint view) {
   EyePoint point = work.points.points[pixel_index];
-  if (point.surface == 0xFFFFFFFFu) return;
-  View view = work.views.views[tile.view];
-  FoundVertex first;
-  first.origin = point.origin;
-  first.direction = point.direction;
-  first.throughput = dvec3(point.coverage);
-  first.media = work.eye_media.media[tile.view];
-  first.previous_position = view.eye;
-  first.previous_normal = dvec3(0.0lf);
-  first.previous_pdf = 0.0lf;
-  first.random = point.random;
-  first.surface = point.surface;
-  first.depth = 0u;
-  wait_for_shading(first);
+  if (point.surface == kNoSurface) return;
+  start_path(view, Ray(point.origin, point.direction), point.coverage, point.random, point.surface);
 }
 
 void main() {
@@ -43,7 +43,7 @@ void main() {
   work.states.states[pixel_index].is_cut_off = 0u;
   work.states.states[pixel_index].covered = 0u;
   if (uint64_t(work.points) != 0ul) {
-    start_point(tile);
+    start_point(tile.view);
     return;
   }
   if (place.x >= tile.size.x || place.y >= tile.size.y) return;
@@ -57,16 +57,6 @@ void main() {
         work.shows_environment != 0u ? environment_radiance(lights, normalize(ray.direction)) : work.background;
     return;
   }
-  FoundVertex first;
-  first.origin = ray.origin;
-  first.direction = ray.direction;
-  first.throughput = dvec3(1.0lf);
-  first.media = work.eye_media.media[tile.view];
-  first.previous_position = view.eye;
-  first.previous_normal = dvec3(0.0lf);
-  first.previous_pdf = 0.0lf;
-  first.random = make_sampler(pixel_stream(work.random_frame, view.screen_number, view.block + ivec2(at)), work.sample_index);
-  first.surface = ~uint(key);
-  first.depth = 0u;
-  wait_for_shading(first);
+  Sampler random = make_sampler(pixel_stream(work.random_frame, view.screen_number, view.block + ivec2(at)), work.sample_index);
+  start_path(tile.view, ray, 1.0lf, random, ~uint(key));
 }

@@ -1,5 +1,5 @@
 // Photons that lights send out: LightSampler::emit() of rt/lights/light_sampler.h, but for coated triangles.
-// Needs lights.glsl and media.glsl, and what they need.
+// Needs scene.glsl, lights.glsl and media.glsl, and what they need.
 
 // As in rt/lights/punctual_light.h.
 struct PhotonStart {
@@ -13,8 +13,6 @@ struct PhotonStart {
   uint surface;     // that emits it; kNoSurface: none
   bool endless;     // it comes from without the scene: any origin before that would do
 };
-
-const uint kNoSurface = 0xFFFFFFFFu;
 
 PhotonStart no_photon() {
   Media nothing = Media(dvec3(0.0lf), dvec3(0.0lf));

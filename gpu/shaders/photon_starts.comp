@@ -6,6 +6,7 @@
 #include "reals.glsl"
 #include "sampling.glsl"
 
+#include "scene.glsl"
 #include "surface_point.glsl"
 #include "view.glsl"
 

@@ -1,6 +1,8 @@
 // A scene's surfaces, as gpu/gpu_scene.h lays them out.
 #include "bvh.glsl"
 
+const uint kNoSurface = 0xFFFFFFFFu;
+
 layout(buffer_reference, scalar) readonly buffer Positions {
   vec3 positions[];
 };

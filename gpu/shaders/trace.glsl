@@ -1,7 +1,5 @@
 // Rays through a scene: which surface they meet first, and whether they meet any. Needs scene.glsl.
 
-const uint kNoSurface = 0xFFFFFFFFu;
-
 struct TracedRay {
   dvec3 origin;
   dvec3 direction;   // unit length
