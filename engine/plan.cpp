@@ -509,7 +509,10 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", primary.why));
   if (plan.distribution == Distribution::SortMiddle) plan.explained.push_back(explain_binning(plan, ranks));
   if (!session.scene().shapes_note.empty()) plan.explained.push_back("shapes: " + session.scene().shapes_note);
-  if (plan.primary == Primary::Raster) session.start_gl();
+  if (plan.primary == Primary::Raster) {
+    session.start_gl();
+    plan.explained.push_back(fmt::format("keys: read by {}", session.key_route()));
+  }
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   fit_photons(session, settings, plan, views);

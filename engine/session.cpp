@@ -23,6 +23,7 @@
 #include "gpu/light/gpu_tile_shader.h"
 #include "raster/chunk_bounds.h"
 #include "raster/gl_context.h"
+#include "raster/keys/key_readback.h"
 #include "raster/raster_speed.h"
 #include "raster/rasterizer.h"
 #include "rt/deferred_shader.h"
@@ -169,6 +170,11 @@ RasterSpeed Session::measure_raster() {
 
 std::string Session::gl_description() const {
   return gl_ ? gl_->description() : "not started, as nothing was drawn by it";
+}
+
+std::string_view Session::key_route() const {
+  HPR_CHECK(gl_);
+  return route_name(fastest_route(*gl_));
 }
 
 std::string Session::gpu() const {

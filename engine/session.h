@@ -80,6 +80,8 @@ class Session {
   [[nodiscard]] RasterSpeed measure_raster();
   /// Renderer, version and device of OpenGL, for people.
   [[nodiscard]] std::string gl_description() const;
+  /// By which route this rank's OpenGL, once started, has its keys read.
+  [[nodiscard]] std::string_view key_route() const;
   /// The GPU that OpenGL draws by on this rank, with its host; empty: none does.
   [[nodiscard]] std::string gpu() const;
   [[nodiscard]] Assembler& assembler() { return *assembler_; }

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <exception>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -58,6 +60,20 @@ GlObject compile(GlContext& context, GLenum kind, std::string_view source) {
                                                 read_log(shader.name(), gl.GetShaderiv, gl.GetShaderInfoLog)));
   }
   return shader;
+}
+
+GlObject link(GlContext& context, std::initializer_list<GLuint> shaders) {
+  const GlFunctions& gl = context.gl();
+  GlObject program(context, gl.CreateProgram(), [](const GlFunctions& f, GLuint name) { f.DeleteProgram(name); });
+  for (const GLuint shader : shaders) gl.AttachShader(program.name(), shader);
+  gl.LinkProgram(program.name());
+  GLint linked = GL_FALSE;
+  gl.GetProgramiv(program.name(), GL_LINK_STATUS, &linked);
+  if (linked != GL_TRUE) {
+    throw Error(ExitCode::NoDevice, fmt::format("the graphics driver cannot link a program: {}",
+                                                read_log(program.name(), gl.GetProgramiv, gl.GetProgramInfoLog)));
+  }
+  return program;
 }
 
 }  // namespace
@@ -116,10 +132,12 @@ GlObject make_vertex_array(GlContext& context) {
   return {context, name, [](const GlFunctions& gl, GLuint n) { gl.DeleteVertexArrays(1, &n); }};
 }
 
-GlObject make_renderbuffer(GlContext& context) {
+GlObject make_texture(GlContext& context) {
   GLuint name = 0;
-  context.gl().CreateRenderbuffers(1, &name);
-  return {context, name, [](const GlFunctions& gl, GLuint n) { gl.DeleteRenderbuffers(1, &n); }};
+  context.gl().CreateTextures(GL_TEXTURE_2D, 1, &name);
+  context.gl().TextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  context.gl().TextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  return {context, name, [](const GlFunctions& gl, GLuint n) { gl.DeleteTextures(1, &n); }};
 }
 
 GlObject make_framebuffer(GlContext& context) {
@@ -129,20 +147,43 @@ GlObject make_framebuffer(GlContext& context) {
 }
 
 GlObject make_program(GlContext& context, std::string_view vertex_source, std::string_view fragment_source) {
-  const GlFunctions& gl = context.gl();
   const GlObject vertex = compile(context, GL_VERTEX_SHADER, vertex_source);
   const GlObject fragment = compile(context, GL_FRAGMENT_SHADER, fragment_source);
-  GlObject program(context, gl.CreateProgram(), [](const GlFunctions& f, GLuint name) { f.DeleteProgram(name); });
-  gl.AttachShader(program.name(), vertex.name());
-  gl.AttachShader(program.name(), fragment.name());
-  gl.LinkProgram(program.name());
-  GLint linked = GL_FALSE;
-  gl.GetProgramiv(program.name(), GL_LINK_STATUS, &linked);
-  if (linked != GL_TRUE) {
-    throw Error(ExitCode::NoDevice, fmt::format("the graphics driver cannot link a program: {}",
-                                                read_log(program.name(), gl.GetProgramiv, gl.GetProgramInfoLog)));
+  return link(context, {vertex.name(), fragment.name()});
+}
+
+GlObject make_compute_program(GlContext& context, std::string_view source) {
+  const GlObject shader = compile(context, GL_COMPUTE_SHADER, source);
+  return link(context, {shader.name()});
+}
+
+GlFence::GlFence(GlContext& context)
+    : context_(context), sync_(context.gl().FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {}
+
+GlFence::~GlFence() {
+  try {
+    context_.make_current();
+    context_.gl().DeleteSync(sync_);
+  } catch (const std::exception& error) {
+    log::warning("a GL fence is left behind: {}", error.what());
   }
-  return program;
+}
+
+void GlFence::wait(std::string_view doing, std::chrono::nanoseconds limit) const {
+  const auto limit_ns = static_cast<GLuint64>(limit.count());
+  switch (context_.gl().ClientWaitSync(sync_, GL_SYNC_FLUSH_COMMANDS_BIT, limit_ns)) {
+    case GL_ALREADY_SIGNALED:
+    case GL_CONDITION_SATISFIED:
+      return;
+    case GL_TIMEOUT_EXPIRED:
+      throw Error(ExitCode::Hang,
+                  fmt::format("OpenGL has not answered for {} s while {}",
+                              std::chrono::duration_cast<std::chrono::seconds>(limit).count(), doing),
+                  "see what the system's log says of it (dmesg)");
+    default:
+      throw Error(ExitCode::NoDevice, fmt::format("OpenGL cannot wait while {}", doing),
+                  "try another driver with --backend egl or --backend osmesa");
+  }
 }
 
 }  // namespace hpr

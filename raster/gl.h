@@ -2,6 +2,7 @@
 
 #include <GL/glcorearb.h>
 
+#include <chrono>
 #include <functional>
 #include <span>
 #include <string>
@@ -14,65 +15,77 @@
 namespace hpr {
 
 /// Every OpenGL 4.5 core function HPR calls: its name without "gl", and its type in <GL/glcorearb.h>.
-#define HPR_GL_FUNCTIONS(X)                                              \
-  X(AttachShader, PFNGLATTACHSHADERPROC)                                 \
-  X(BindBuffer, PFNGLBINDBUFFERPROC)                                     \
-  X(BindFramebuffer, PFNGLBINDFRAMEBUFFERPROC)                           \
-  X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)                           \
-  X(CheckNamedFramebufferStatus, PFNGLCHECKNAMEDFRAMEBUFFERSTATUSPROC)   \
-  X(ClearBufferfv, PFNGLCLEARBUFFERFVPROC)                               \
-  X(ClearBufferuiv, PFNGLCLEARBUFFERUIVPROC)                             \
-  X(ClipControl, PFNGLCLIPCONTROLPROC)                                   \
-  X(ColorMask, PFNGLCOLORMASKPROC)                                       \
-  X(CompileShader, PFNGLCOMPILESHADERPROC)                               \
-  X(CreateBuffers, PFNGLCREATEBUFFERSPROC)                               \
-  X(CreateFramebuffers, PFNGLCREATEFRAMEBUFFERSPROC)                     \
-  X(CreateProgram, PFNGLCREATEPROGRAMPROC)                               \
-  X(CreateRenderbuffers, PFNGLCREATERENDERBUFFERSPROC)                   \
-  X(CreateShader, PFNGLCREATESHADERPROC)                                 \
-  X(CreateVertexArrays, PFNGLCREATEVERTEXARRAYSPROC)                     \
-  X(CullFace, PFNGLCULLFACEPROC)                                         \
-  X(DeleteBuffers, PFNGLDELETEBUFFERSPROC)                               \
-  X(DeleteFramebuffers, PFNGLDELETEFRAMEBUFFERSPROC)                     \
-  X(DeleteProgram, PFNGLDELETEPROGRAMPROC)                               \
-  X(DeleteRenderbuffers, PFNGLDELETERENDERBUFFERSPROC)                   \
-  X(DeleteShader, PFNGLDELETESHADERPROC)                                 \
-  X(DeleteVertexArrays, PFNGLDELETEVERTEXARRAYSPROC)                     \
-  X(DepthFunc, PFNGLDEPTHFUNCPROC)                                       \
-  X(DepthMask, PFNGLDEPTHMASKPROC)                                       \
-  X(DepthRangef, PFNGLDEPTHRANGEFPROC)                                   \
-  X(Disable, PFNGLDISABLEPROC)                                           \
-  X(DrawElements, PFNGLDRAWELEMENTSPROC)                                 \
-  X(Enable, PFNGLENABLEPROC)                                             \
-  X(EnableVertexArrayAttrib, PFNGLENABLEVERTEXARRAYATTRIBPROC)           \
-  X(Finish, PFNGLFINISHPROC)                                             \
-  X(FrontFace, PFNGLFRONTFACEPROC)                                       \
-  X(GetError, PFNGLGETERRORPROC)                                         \
-  X(GetIntegerv, PFNGLGETINTEGERVPROC)                                   \
-  X(GetProgramInfoLog, PFNGLGETPROGRAMINFOLOGPROC)                       \
-  X(GetProgramiv, PFNGLGETPROGRAMIVPROC)                                 \
-  X(GetShaderInfoLog, PFNGLGETSHADERINFOLOGPROC)                         \
-  X(GetShaderiv, PFNGLGETSHADERIVPROC)                                   \
-  X(GetString, PFNGLGETSTRINGPROC)                                       \
-  X(LinkProgram, PFNGLLINKPROGRAMPROC)                                   \
-  X(MultiDrawElementsIndirect, PFNGLMULTIDRAWELEMENTSINDIRECTPROC)       \
-  X(NamedBufferData, PFNGLNAMEDBUFFERDATAPROC)                           \
-  X(NamedBufferStorage, PFNGLNAMEDBUFFERSTORAGEPROC)                     \
-  X(NamedFramebufferRenderbuffer, PFNGLNAMEDFRAMEBUFFERRENDERBUFFERPROC) \
-  X(NamedRenderbufferStorage, PFNGLNAMEDRENDERBUFFERSTORAGEPROC)         \
-  X(PixelStorei, PFNGLPIXELSTOREIPROC)                                   \
-  X(PolygonMode, PFNGLPOLYGONMODEPROC)                                   \
-  X(ReadPixels, PFNGLREADPIXELSPROC)                                     \
-  X(Scissor, PFNGLSCISSORPROC)                                           \
-  X(ShaderSource, PFNGLSHADERSOURCEPROC)                                 \
-  X(UniformMatrix4fv, PFNGLUNIFORMMATRIX4FVPROC)                         \
-  X(UseProgram, PFNGLUSEPROGRAMPROC)                                     \
-  X(VertexArrayAttribBinding, PFNGLVERTEXARRAYATTRIBBINDINGPROC)         \
-  X(VertexArrayAttribFormat, PFNGLVERTEXARRAYATTRIBFORMATPROC)           \
-  X(VertexArrayAttribIFormat, PFNGLVERTEXARRAYATTRIBIFORMATPROC)         \
-  X(VertexArrayBindingDivisor, PFNGLVERTEXARRAYBINDINGDIVISORPROC)       \
-  X(VertexArrayElementBuffer, PFNGLVERTEXARRAYELEMENTBUFFERPROC)         \
-  X(VertexArrayVertexBuffer, PFNGLVERTEXARRAYVERTEXBUFFERPROC)           \
+#define HPR_GL_FUNCTIONS(X)                                            \
+  X(AttachShader, PFNGLATTACHSHADERPROC)                               \
+  X(BindBuffer, PFNGLBINDBUFFERPROC)                                   \
+  X(BindBufferRange, PFNGLBINDBUFFERRANGEPROC)                         \
+  X(BindFramebuffer, PFNGLBINDFRAMEBUFFERPROC)                         \
+  X(BindTextureUnit, PFNGLBINDTEXTUREUNITPROC)                         \
+  X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)                         \
+  X(CheckNamedFramebufferStatus, PFNGLCHECKNAMEDFRAMEBUFFERSTATUSPROC) \
+  X(ClearBufferfv, PFNGLCLEARBUFFERFVPROC)                             \
+  X(ClearBufferuiv, PFNGLCLEARBUFFERUIVPROC)                           \
+  X(ClientWaitSync, PFNGLCLIENTWAITSYNCPROC)                           \
+  X(ClipControl, PFNGLCLIPCONTROLPROC)                                 \
+  X(ColorMask, PFNGLCOLORMASKPROC)                                     \
+  X(CompileShader, PFNGLCOMPILESHADERPROC)                             \
+  X(CopyNamedBufferSubData, PFNGLCOPYNAMEDBUFFERSUBDATAPROC)           \
+  X(CreateBuffers, PFNGLCREATEBUFFERSPROC)                             \
+  X(CreateFramebuffers, PFNGLCREATEFRAMEBUFFERSPROC)                   \
+  X(CreateProgram, PFNGLCREATEPROGRAMPROC)                             \
+  X(CreateShader, PFNGLCREATESHADERPROC)                               \
+  X(CreateTextures, PFNGLCREATETEXTURESPROC)                           \
+  X(CreateVertexArrays, PFNGLCREATEVERTEXARRAYSPROC)                   \
+  X(CullFace, PFNGLCULLFACEPROC)                                       \
+  X(DeleteBuffers, PFNGLDELETEBUFFERSPROC)                             \
+  X(DeleteFramebuffers, PFNGLDELETEFRAMEBUFFERSPROC)                   \
+  X(DeleteProgram, PFNGLDELETEPROGRAMPROC)                             \
+  X(DeleteShader, PFNGLDELETESHADERPROC)                               \
+  X(DeleteSync, PFNGLDELETESYNCPROC)                                   \
+  X(DeleteTextures, PFNGLDELETETEXTURESPROC)                           \
+  X(DeleteVertexArrays, PFNGLDELETEVERTEXARRAYSPROC)                   \
+  X(DepthFunc, PFNGLDEPTHFUNCPROC)                                     \
+  X(DepthMask, PFNGLDEPTHMASKPROC)                                     \
+  X(DepthRangef, PFNGLDEPTHRANGEFPROC)                                 \
+  X(Disable, PFNGLDISABLEPROC)                                         \
+  X(DispatchCompute, PFNGLDISPATCHCOMPUTEPROC)                         \
+  X(DrawElements, PFNGLDRAWELEMENTSPROC)                               \
+  X(Enable, PFNGLENABLEPROC)                                           \
+  X(EnableVertexArrayAttrib, PFNGLENABLEVERTEXARRAYATTRIBPROC)         \
+  X(FenceSync, PFNGLFENCESYNCPROC)                                     \
+  X(Finish, PFNGLFINISHPROC)                                           \
+  X(FrontFace, PFNGLFRONTFACEPROC)                                     \
+  X(GetError, PFNGLGETERRORPROC)                                       \
+  X(GetIntegerv, PFNGLGETINTEGERVPROC)                                 \
+  X(GetProgramInfoLog, PFNGLGETPROGRAMINFOLOGPROC)                     \
+  X(GetProgramiv, PFNGLGETPROGRAMIVPROC)                               \
+  X(GetShaderInfoLog, PFNGLGETSHADERINFOLOGPROC)                       \
+  X(GetShaderiv, PFNGLGETSHADERIVPROC)                                 \
+  X(GetString, PFNGLGETSTRINGPROC)                                     \
+  X(LinkProgram, PFNGLLINKPROGRAMPROC)                                 \
+  X(MapNamedBufferRange, PFNGLMAPNAMEDBUFFERRANGEPROC)                 \
+  X(MemoryBarrier, PFNGLMEMORYBARRIERPROC)                             \
+  X(MultiDrawElementsIndirect, PFNGLMULTIDRAWELEMENTSINDIRECTPROC)     \
+  X(NamedBufferData, PFNGLNAMEDBUFFERDATAPROC)                         \
+  X(NamedBufferStorage, PFNGLNAMEDBUFFERSTORAGEPROC)                   \
+  X(NamedFramebufferTexture, PFNGLNAMEDFRAMEBUFFERTEXTUREPROC)         \
+  X(PixelStorei, PFNGLPIXELSTOREIPROC)                                 \
+  X(PolygonMode, PFNGLPOLYGONMODEPROC)                                 \
+  X(ReadPixels, PFNGLREADPIXELSPROC)                                   \
+  X(Scissor, PFNGLSCISSORPROC)                                         \
+  X(ShaderSource, PFNGLSHADERSOURCEPROC)                               \
+  X(TextureParameteri, PFNGLTEXTUREPARAMETERIPROC)                     \
+  X(TextureStorage2D, PFNGLTEXTURESTORAGE2DPROC)                       \
+  X(Uniform1i, PFNGLUNIFORM1IPROC)                                     \
+  X(Uniform4i, PFNGLUNIFORM4IPROC)                                     \
+  X(UniformMatrix4fv, PFNGLUNIFORMMATRIX4FVPROC)                       \
+  X(UseProgram, PFNGLUSEPROGRAMPROC)                                   \
+  X(VertexArrayAttribBinding, PFNGLVERTEXARRAYATTRIBBINDINGPROC)       \
+  X(VertexArrayAttribFormat, PFNGLVERTEXARRAYATTRIBFORMATPROC)         \
+  X(VertexArrayAttribIFormat, PFNGLVERTEXARRAYATTRIBIFORMATPROC)       \
+  X(VertexArrayBindingDivisor, PFNGLVERTEXARRAYBINDINGDIVISORPROC)     \
+  X(VertexArrayElementBuffer, PFNGLVERTEXARRAYELEMENTBUFFERPROC)       \
+  X(VertexArrayVertexBuffer, PFNGLVERTEXARRAYVERTEXBUFFERPROC)         \
   X(Viewport, PFNGLVIEWPORTPROC)
 
 /// The functions of one context. Two contexts of one process may come from different libraries (EGL's vendor, OSMesa),
@@ -123,10 +136,33 @@ class GlObject {
 /// All of them expect the context to be current.
 [[nodiscard]] GlObject make_buffer(GlContext& context);
 [[nodiscard]] GlObject make_vertex_array(GlContext& context);
-[[nodiscard]] GlObject make_renderbuffer(GlContext& context);
+/// Two-dimensional, for single texels: neither filtered nor mipmapped.
+[[nodiscard]] GlObject make_texture(GlContext& context);
 [[nodiscard]] GlObject make_framebuffer(GlContext& context);
 /// Throws Error (NoDevice) with the driver's log when a shader is refused.
 [[nodiscard]] GlObject make_program(GlContext& context, std::string_view vertex_source,
                                     std::string_view fragment_source);
+[[nodiscard]] GlObject make_compute_program(GlContext& context, std::string_view source);
+
+/// How long GL may take for what was asked of it.
+inline constexpr std::chrono::seconds kGlWaitLimit{30};
+
+/// A point after all commands that its context was sent before it was made.
+class GlFence {
+ public:
+  /// Expects the context to be current.
+  explicit GlFence(GlContext& context);
+  ~GlFence();
+  GlFence(const GlFence&) = delete;
+  GlFence& operator=(const GlFence&) = delete;
+
+  /// Returns once those commands are done. Throws Error: Hang where they are not within `limit`, NoDevice where GL
+  /// cannot wait. `doing`: as in "drawing".
+  void wait(std::string_view doing, std::chrono::nanoseconds limit = kGlWaitLimit) const;
+
+ private:
+  GlContext& context_;
+  GLsync sync_;
+};
 
 }  // namespace hpr

@@ -49,10 +49,10 @@ GlInfo query_gl_info(const GlFunctions& gl) {
                 "update the graphics driver");
   }
   std::array<GLint, 2> viewport{};
-  GLint renderbuffer = 0;
+  GLint texture = 0;
   gl.GetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport.data());
-  gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &renderbuffer);
-  const GLint largest = std::min({viewport[0], viewport[1], renderbuffer});
+  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &texture);
+  const GLint largest = std::min({viewport[0], viewport[1], texture});
   if (largest < kRasterLimit) {
     throw Error(ExitCode::NoDevice,
                 fmt::format("{} draws at most {} pixels a side; HPR needs {}", info.renderer, largest, kRasterLimit));

@@ -99,7 +99,7 @@ inline Image<Key> draw_parts(GlContext& context, const Scene& scene, std::span<c
                              const View& view, std::span<const Rect> parts, Culling culling = Culling::Chunks,
                              int threads = 1) {
   TileLayer<Key> layer(FrameLayout({view.size()}));
-  Rasterizer rasterizer(context, scene, objects, threads, culling);
+  Rasterizer rasterizer(context, scene, objects, threads, {.culling = culling});
   rasterizer.draw(view, 0, parts, layer);
   return to_image(layer, 0);
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -15,7 +16,7 @@
 #include "raster/chunk_triangles.h"
 #include "raster/geometry.h"
 #include "raster/gl.h"
-#include "raster/key_drawer.h"
+#include "raster/keys/key_drawer.h"
 
 namespace hpr {
 namespace {
@@ -72,14 +73,14 @@ class ReleaseAtEnd {
 class Rasterizer::Implementation {
  public:
   Implementation(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
-                 Culling culling)
+                 const RasterOptions& options)
       : context_(current(context)),
         scene_(scene),
         threads_(threads),
-        culling_(culling),
+        options_(options),
         vertices_(make_buffer(context)),
         indices_(make_buffer(context)) {
-    drawers_.push_back(std::make_unique<KeyDrawer>(context, vertices_, indices_));
+    drawers_.push_back(std::make_unique<KeyDrawer>(context, vertices_, indices_, route()));
     load(collect_geometry(scene, objects));
   }
 
@@ -128,6 +129,8 @@ class Rasterizer::Implementation {
     return context;
   }
 
+  [[nodiscard]] KeyRoute route() const { return options_.route.value_or(fastest_route(context_)); }
+
   /// How many contexts draw a list, at most.
   [[nodiscard]] std::size_t contexts_for(const View& view, const DrawList& list) const {
     if (!context_.software()) return 1;
@@ -145,50 +148,58 @@ class Rasterizer::Implementation {
       if (!context) break;
       context->make_current();
       const ReleaseAtEnd at_end(*context);
-      drawers_.push_back(std::make_unique<KeyDrawer>(*context, vertices_, indices_));
+      drawers_.push_back(std::make_unique<KeyDrawer>(*context, vertices_, indices_, route()));
       shared_.push_back(std::move(context));
     }
     return std::min(count, drawers_.size());
   }
 
+  /// Returns once it is drawn, with the ms that this took.
+  static double draw_list(KeyDrawer& drawer, const View& view, const DrawList& list, DepthFormat format) {
+    const Stopwatch watch;
+    const trace::Span span("draw triangles");
+    drawer.begin(format);
+    drawer.start(view, list);
+    drawer.wait();
+    return watch.ms();
+  }
+
   void draw_part(const View& view, std::size_t screen, const Rect& part, std::span<const Piece> pieces,
                  TileLayer<Key>& layer, const std::vector<SurfaceRange>* only) {
     Stopwatch watch;
+    std::optional<trace::Span> span(std::in_place, "cull chunks");
     const auto lap = [&watch](double& ms) {
       ms += watch.ms();
       watch.restart();
     };
-    DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, culling_, threads_, only);
+    DrawList list = make_draw_list(scene_, geometry_, pieces, view, part, options_.culling, threads_, only);
     stats_.triangles_drawn += list.triangles_drawn;
     stats_.triangles_culled += list.triangles_culled;
     stats_.chunks_drawn += list.chunks_drawn;
     stats_.chunks_culled += list.chunks_culled;
     lap(stats_.cull_ms);
+    span.reset();
     if (list.commands.empty() || list.pixels.empty()) return;
 
     const std::size_t contexts = add_drawers(contexts_for(view, list));
     const std::vector<DrawList> lists = split_list(std::move(list), contexts);
     context_.release();
     std::vector<double> draw_ms(lists.size());
+    std::vector<DrawnKeys> drawn(lists.size());
     parallel_for(static_cast<int>(lists.size()), lists.size(), [&](std::size_t i) {
-      const Stopwatch drawing;
-      KeyDrawer& drawer = *drawers_[i];
-      const ReleaseAtEnd at_end(drawer.context());
-      drawer.begin(layer.depth_format());
-      drawer.draw(view, lists[i]);
-      draw_ms[i] = drawing.ms();
-      drawer.read(view, lists[i]);
-      check_gl(drawer.context().gl(), "drawing");
+      const ReleaseAtEnd at_end(drawers_[i]->context());
+      draw_ms[i] = draw_list(*drawers_[i], view, lists[i], layer.depth_format());
+      const trace::Span reading("read keys", "pixels", lists[i].pixels.area());
+      drawn[i] = drawers_[i]->finish(view, lists[i]);
+      check_gl(drawers_[i]->context().gl(), "drawing");
     });
     const double slowest_ms = std::ranges::max(draw_ms);
     stats_.draw_ms += slowest_ms;
     stats_.read_ms += watch.ms() - slowest_ms;
     watch.restart();
-    std::vector<KeyHalves> drawn;
-    drawn.reserve(lists.size());
-    for (std::size_t i = 0; i < lists.size(); ++i) drawn.push_back(drawers_[i]->target().halves());
     const Rect& pixels = lists.front().pixels;
     stats_.pixels_read += lists.size() * pixels.area();
+    const trace::Span packing("pack keys");
     pack_keys(drawn, pixels, screen, layer, threads_);
     lap(stats_.pack_ms);
   }
@@ -196,7 +207,7 @@ class Rasterizer::Implementation {
   GlContext& context_;
   const Scene& scene_;
   int threads_;
-  Culling culling_;
+  RasterOptions options_;
   Geometry geometry_;
   GlObject vertices_;
   GlObject indices_;
@@ -206,8 +217,8 @@ class Rasterizer::Implementation {
 };
 
 Rasterizer::Rasterizer(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
-                       Culling culling)
-    : implementation_(std::make_unique<Implementation>(context, scene, objects, threads, culling)) {}
+                       const RasterOptions& options)
+    : implementation_(std::make_unique<Implementation>(context, scene, objects, threads, options)) {}
 
 Rasterizer::~Rasterizer() = default;
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,11 +12,18 @@
 #include "raster/chunk_bins.h"
 #include "raster/draw_list.h"
 #include "raster/gl_context.h"
+#include "raster/keys/key_readback.h"
 #include "raster/raster_stats.h"
 #include "scene/scene.h"
 #include "scene/view.h"
 
 namespace hpr {
+
+/// What changes no key.
+struct RasterOptions {
+  Culling culling = Culling::Chunks;
+  std::optional<KeyRoute> route = std::nullopt;  ///< none: fastest_route()
+};
 
 /// Draws one rank's part of a scene into keys by OpenGL.
 ///
@@ -27,7 +35,7 @@ class Rasterizer {
   /// memory for the triangles, NoDevice when it reports another error. `threads`: for culling and packing; GL's own are
   /// set with the context.
   Rasterizer(GlContext& context, const Scene& scene, std::span<const SurfaceRange> objects, int threads,
-             Culling culling = Culling::Chunks);
+             const RasterOptions& options = {});
   ~Rasterizer();
   Rasterizer(const Rasterizer&) = delete;
   Rasterizer& operator=(const Rasterizer&) = delete;

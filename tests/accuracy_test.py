@@ -76,6 +76,7 @@ def depths(folder):
                       (("--primary", "raster"), "raster (as asked)")):
         result = hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *plain(*how))
         expect(f"primary: {said}\n" in result.stdout, f"{how}: {result.stdout} {result.stderr}")
+        expect(("keys: read by " in result.stdout) == said.startswith("raster"), f"{how}: {result.stdout}")
     chosen = {hpr(folder, "render", SCENE, "--explain", "--size", "32x32", *plain(*how)).stdout.split("primary: ")[1].split("\n")[0]
               for how in ((), ("--ranks", "2", "--distribute", "sort-last"), ("--primary", "auto", "--threads", "1"))}
     expect(len(chosen) == 1 and "(" in chosen.copy().pop(), f"the same picture's keys are made by {chosen}")

@@ -35,6 +35,7 @@
 #include "gpu/device/gpu_device.h"
 #include "image/image_io.h"
 #include "raster/gl_context.h"
+#include "raster/keys/key_readback.h"
 #include "rt/trace/embree_compat.h"
 
 namespace hpr {
@@ -243,11 +244,10 @@ namespace {
 Finding try_backend(const std::string& backend) {
   try {
     const auto context = make_gl_context({.backend = backend, .device = -1, .local_rank = 0, .threads = 1});
-    if (context->software()) {
-      return {backend, FindingStatus::Ok, context->description() + " (software: pictures are right, frames are slow)",
-              ""};
-    }
-    return {backend, FindingStatus::Ok, context->description(), ""};
+    return {backend, FindingStatus::Ok,
+            fmt::format("{}, keys read by {}{}", context->description(), route_name(fastest_route(*context)),
+                        context->software() ? " (software: pictures are right, frames are slow)" : ""),
+            ""};
   } catch (const Error& error) {
     return {backend, FindingStatus::Warn, error.what(), error.hint()};
   }

@@ -1,15 +1,16 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include "image/image.h"
 #include "raster/gl.h"
 #include "raster/gl_context.h"
+#include "raster/keys/key_readback.h"
+#include "raster/keys/key_target.h"
 
 namespace hpr {
 
@@ -17,10 +18,10 @@ namespace hpr {
 class BareGl {
  public:
   BareGl(GlContext& context, std::span<const glm::vec3> positions, std::span<const glm::uvec3> triangles,
-         const glm::mat4& clip_from_world, Size size);
+         const glm::mat4& clip_from_world, Size size, KeyRoute route);
 
-  /// One glDrawElements, glReadPixels of depths and of ids, glFinish.
-  void frame();
+  /// One glDrawElements, whose ids and depths the route brings into memory.
+  [[nodiscard]] DrawnKeys frame();
 
  private:
   GlContext& context_;
@@ -29,11 +30,8 @@ class BareGl {
   GlObject positions_;
   GlObject indices_;
   GlObject vertex_array_;
-  GlObject ids_buffer_;
-  GlObject depth_buffer_;
-  GlObject framebuffer_;
-  std::vector<std::uint32_t> ids_;
-  std::vector<float> depths_;
+  KeyTarget target_;
+  std::unique_ptr<KeyReadback> readback_;
   std::array<float, 16> matrix_{};
   GLsizei index_count_ = 0;
 };

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "image/key.h"
 #include "raster/draw_list.h"
 #include "raster/gl.h"
-#include "raster/key_target.h"
+#include "raster/keys/key_readback.h"
+#include "raster/keys/key_target.h"
 #include "scene/view.h"
 
 namespace hpr {
@@ -14,7 +17,7 @@ namespace hpr {
 class KeyDrawer {
  public:
   /// `vertices` and `indices`: of Geometry, buffers of that context or of one it shares buffers with. All outlive this.
-  KeyDrawer(GlContext& context, const GlObject& vertices, const GlObject& indices);
+  KeyDrawer(GlContext& context, const GlObject& vertices, const GlObject& indices, KeyRoute route);
 
   [[nodiscard]] GlContext& context() { return context_; }
   /// Other contexts of those that share buffers have filled the buffers anew.
@@ -22,11 +25,12 @@ class KeyDrawer {
 
   /// Makes its context current on this thread, for whatever comes next.
   void begin(DepthFormat format);
-  /// Clears the list's pixels and draws the list, to the end.
-  void draw(const View& view, const DrawList& list);
-  /// The list's pixels; see KeyTarget.
-  void read(const View& view, const DrawList& list) { target_.read(view.size(), list.pixels); }
-  [[nodiscard]] const KeyTarget& target() const { return target_; }
+  /// Has the list's pixels cleared and the list drawn.
+  void start(const View& view, const DrawList& list);
+  /// Returns once it is drawn. Throws Error (Hang) after kGlWaitLimit, as finish() does.
+  void wait();
+  /// The keys of the pixels of that list, which stay until the next start().
+  [[nodiscard]] DrawnKeys finish(const View& view, const DrawList& list);
 
  private:
   void describe_vertices();
@@ -41,6 +45,8 @@ class KeyDrawer {
   GlObject commands_;
   GlObject vertex_array_;
   KeyTarget target_;
+  std::unique_ptr<KeyReadback> readback_;
+  std::optional<GlFence> drawn_;  ///< of the list
   bool stale_ = false;
 };
 

@@ -1,4 +1,4 @@
-#include "raster/key_target.h"
+#include "raster/keys/drawn_keys.h"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ TEST(PackKeys, PutsEveryPixelWhereItBelongs) {
       }
     }
     TileLayer<Key> layer(FrameLayout({Size{64, 64}, Size{300, 170}}));
-    pack_keys(std::array{KeyHalves{depths, words}}, rect, 1, layer, 3);
+    pack_keys(std::array{DrawnKeys(KeyHalves{depths, words})}, rect, 1, layer, 3);
     for (std::size_t tile = 0; tile < layer.tiles(); ++tile) {
       const TilePlace position = layer.layout().place(tile);
       bool drawn = false;
@@ -51,8 +51,8 @@ TEST(PackKeys, KeepsTheLargerKey) {
   const std::vector<std::uint32_t> first_words{word(7), word(7), 0, word(1)};
   const std::vector<float> second_depths{0.25F, 0.5F, 0.125F, 0.0F};
   const std::vector<std::uint32_t> second_words{word(1), word(3), word(9), 0};
-  const KeyHalves first{first_depths, first_words};
-  const KeyHalves second{second_depths, second_words};
+  const DrawnKeys first = KeyHalves{first_depths, first_words};
+  const DrawnKeys second = KeyHalves{second_depths, second_words};
   pack_keys(std::array{first}, rect, 0, layer, 1);
   pack_keys(std::array{second}, rect, 0, layer, 1);
   EXPECT_EQ(layer.at(0, 0, 0), make_key(0.5F, 7));
@@ -69,8 +69,8 @@ TEST(PackKeys, OfNothingLeavesTheTilesInactive) {
   TileLayer<Key> layer(FrameLayout({Size{100, 100}}));
   const std::vector<float> depths(10000, 0.0F);
   const std::vector<std::uint32_t> words(10000, 0);
-  pack_keys(std::array{KeyHalves{depths, words}}, {0, 0, 100, 100}, 0, layer, 2);
-  pack_keys(std::array{KeyHalves{}}, {5, 5, 5, 9}, 0, layer, 2);
+  pack_keys(std::array{DrawnKeys(KeyHalves{depths, words})}, {0, 0, 100, 100}, 0, layer, 2);
+  pack_keys(std::array{DrawnKeys(KeyHalves{})}, {5, 5, 5, 9}, 0, layer, 2);
   EXPECT_EQ(layer.active_tiles(), 0U);
 }
 

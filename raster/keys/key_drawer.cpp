@@ -1,4 +1,4 @@
-#include "raster/key_drawer.h"
+#include "raster/keys/key_drawer.h"
 
 #include <fmt/format.h>
 
@@ -67,7 +67,7 @@ void draw_span(const GlFunctions& gl, const DrawSpan& span) {
 
 }  // namespace
 
-KeyDrawer::KeyDrawer(GlContext& context, const GlObject& vertices, const GlObject& indices)
+KeyDrawer::KeyDrawer(GlContext& context, const GlObject& vertices, const GlObject& indices, KeyRoute route)
     : context_(context),
       vertices_(vertices),
       indices_(indices),
@@ -75,7 +75,8 @@ KeyDrawer::KeyDrawer(GlContext& context, const GlObject& vertices, const GlObjec
       records_(make_buffer(context)),
       commands_(make_buffer(context)),
       vertex_array_(make_vertex_array(context)),
-      target_(context) {
+      target_(context),
+      readback_(make_key_readback(route, context)) {
   describe_vertices();
 }
 
@@ -131,14 +132,26 @@ void KeyDrawer::begin(DepthFormat format) {
   stale_ = false;
 }
 
-void KeyDrawer::draw(const View& view, const DrawList& list) {
+void KeyDrawer::start(const View& view, const DrawList& list) {
   const GlFunctions& gl = context_.gl();
   target_.begin(view.size(), list.pixels);
   set_state();
   upload(gl, records_, list.records, GL_STREAM_DRAW);
   upload(gl, commands_, list.commands, GL_STREAM_DRAW);
   for (const DrawSpan& span : list.spans) draw_span(gl, span);
-  gl.Finish();
+  drawn_.emplace(context_);
+  // A GPU has all its work at once. A software GL does it within this very call, and is to be timed step by step.
+  if (!context_.software()) readback_->start(target_, view.size(), list.pixels);
+}
+
+void KeyDrawer::wait() {
+  drawn_->wait("drawing");
+  drawn_.reset();
+}
+
+DrawnKeys KeyDrawer::finish(const View& view, const DrawList& list) {
+  if (context_.software()) readback_->start(target_, view.size(), list.pixels);
+  return readback_->finish();
 }
 
 }  // namespace hpr
