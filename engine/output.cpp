@@ -140,11 +140,7 @@ RunStats gather_stats(Session& session, const FramePlan& plan, const FrameTimes&
     stats.rays.primary += traced.rays;
     stats.rays.invalid += traced.invalid;
   }
-  for (const RasterStats& drawn : all_gather_value(comm, times.raster)) {
-    const double cull_ms = std::max(stats.raster.cull_ms, drawn.cull_ms);
-    stats.raster += drawn;
-    stats.raster.cull_ms = cull_ms;
-  }
+  for (const RasterStats& drawn : all_gather_value(comm, times.raster)) stats.raster.join(drawn);
   if (plan.distribution == Distribution::SortMiddle)
     stats.times.push_back({"exchange-chunks", slowest(comm, times.chunk_exchange_ms)});
   stats.times.push_back({"composite", slowest(comm, times.composite_ms + times.move_ms)});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace hpr {
@@ -13,8 +14,8 @@ struct RasterStats {
   std::uint64_t pixels_read = 0;
   double cull_ms = 0.0;
   double draw_ms = 0.0;  ///< upload of the commands, clear and GL's drawing, to its end
-  double read_ms = 0.0;
-  double pack_ms = 0.0;
+  double read_ms = 0.0;  ///< until its pixels are in memory, joined to keys where a shader does that
+  double pack_ms = 0.0;  ///< into the layer's tiles
 
   RasterStats& operator+=(const RasterStats& other) {
     triangles_drawn += other.triangles_drawn;
@@ -27,6 +28,15 @@ struct RasterStats {
     read_ms += other.read_ms;
     pack_ms += other.pack_ms;
     return *this;
+  }
+  /// Adds the counts of another rank, which drew at the same time: the longer times stay.
+  void join(const RasterStats& other) {
+    const RasterStats own = *this;
+    *this += other;
+    cull_ms = std::max(own.cull_ms, other.cull_ms);
+    draw_ms = std::max(own.draw_ms, other.draw_ms);
+    read_ms = std::max(own.read_ms, other.read_ms);
+    pack_ms = std::max(own.pack_ms, other.pack_ms);
   }
 };
 

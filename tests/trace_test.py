@@ -55,6 +55,12 @@ def names(spans):
     return {span["name"] for span in spans}
 
 
+def counts_of(folder, *arguments):
+    """What OpenGL drew of a picture, and its times."""
+    hpr(folder, *arguments, "--stats", "a.json", "--force")
+    return json.loads((folder / "a.json").read_text())["raster"]
+
+
 def pictures(folder):
     base = ("render", "gen:gallery", "--size", "200x130", "-o", "a.png", "--spp", "2")
     raster = (*base, "--primary", "raster")
@@ -63,8 +69,13 @@ def pictures(folder):
     alone = trace_of(folder, 1, *raster, "--threads", "2")[0]
     expect((folder / "a.png").read_bytes() == plain, "a trace changes the picture")
     wanted = {"run", "load scene", "start OpenGL", "upload geometry", "prepare light", "build ray scene", "sample", "raster",
+              "cull chunks", "draw triangles", "read keys", "pack keys",
               "photons", "light", "light tile", "write picture"}
     expect(wanted <= names(alone), f"one rank: no {wanted - names(alone)}")
+    expect(all(s["args"]["pixels"] == 200 * 130 for s in alone if s["name"] == "read keys"), "pixels that are read")
+    drawn = counts_of(folder, *raster)
+    expect(drawn["pixels_read"] == 2 * 200 * 130 and drawn["triangles_drawn"] > drawn["chunks_drawn"] > 0, f"counts {drawn}")
+    expect(all(drawn[f"{step}_ms"] > 0.0 for step in ("cull", "draw", "read", "pack")), f"times {drawn}")
     samples = sorted(s["args"]["number"] for s in alone if s["name"] == "sample")
     expect(samples == [0, 1], f"samples {samples}")
     tiles = sorted(s["args"]["tile"] for s in alone if s["name"] == "light tile")
