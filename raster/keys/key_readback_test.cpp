@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "core/error.h"
 #include "raster/raster_test_scenes.h"
@@ -41,6 +42,12 @@ TEST_P(KeyReadbackTest, BringsEveryPixelToWhereItIs) {
   const GlFunctions& gl = context_->gl();
   KeyTarget target(*context_);
   const std::unique_ptr<KeyReadback> readback = make_key_readback(route_, *context_);
+  // What stands around the part is none of its keys.
+  constexpr std::array<GLuint, 4> kOtherWord{7, 0, 0, 0};
+  constexpr GLfloat kOtherDepth = 0.5F;
+  target.begin(kView, {0, 0, kView.width, kView.height});
+  gl.ClearBufferfv(GL_DEPTH, 0, &kOtherDepth);
+  gl.ClearBufferuiv(GL_COLOR, 0, kOtherWord.data());
   target.begin(kView, kPart);
   TileLayer<Key> expected(FrameLayout({kView}));
   // Cells of odd sizes over some of the part; one tile of it stays empty.
@@ -125,8 +132,10 @@ TEST_P(KeyReadbackTest, AViewOfMoreTilesThanShadersReachAtOnceIsReadWhole) {
   const View view = perspective_view({kRasterLimit, 193});
   TileLayer<Key> expected(FrameLayout({view.size()}));
   TileLayer<Key> layer(FrameLayout({view.size()}));
-  draw(scene, view, KeyRoute::Pixels, expected);
-  draw(scene, view, route_, layer);
+  for (const auto& [route, into] : {std::pair{KeyRoute::Pixels, &expected}, std::pair{route_, &layer}}) {
+    Rasterizer rasterizer(*context_, scene, std::array{all_of(scene)}, 1, {.route = route});
+    rasterizer.draw(view, 0, std::array{view.block}, *into);
+  }
   EXPECT_TRUE(to_image(layer, 0) == to_image(expected, 0));
 }
 
