@@ -83,7 +83,7 @@ bool holds(const DrawnKeys& drawn, const Rect& pixels, const TileGrid& grid) {
   if (const auto* const halves = std::get_if<KeyHalves>(&drawn)) {
     return halves->depths.size() >= pixels.area() && halves->words.size() >= pixels.area();
   }
-  const KeyTiles& tiles = std::get<KeyTiles>(drawn);
+  const auto& tiles = std::get<KeyTiles>(drawn);
   return tiles.keys.size() >= grid.tiles() * kTilePixels && tiles.drawn.size() >= grid.tiles();
 }
 
