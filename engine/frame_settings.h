@@ -50,6 +50,8 @@ struct FrameSettings {
   RaySettings rays;
   SceneData data = SceneData::Replicated;
   bool indirect_is_chosen = false;  ///< whether rays.gather says who brings indirect light; else plan_frame finds out
+  bool keys_by_device = true;       ///< where there is a device that can make them
+  bool light_by_device = true;      ///< where there is a device that can
   bool single_picture = false;      ///< whether nothing but one sample of one picture is drawn
   bool photons_fit_frame = false;   ///< no more photons a sample than the frame's pixels show
   double resolution_scale = 1.0;    ///< of the screens' pixels: the frame is made of so many a side, and enlarged

@@ -334,10 +334,8 @@ PrimaryChoice primary_of_frame(Session& session, const FrameSettings& settings, 
                                std::span<const View> views) {
   const bool rounds_depth = settings.depth_format != DepthFormat::Float32;
   const bool has_points = std::ranges::any_of(views, [](const View& view) { return view.points.has_value(); });
-  const std::string gpu = rounds_depth || has_points ? "" : session.gpu_of_keys();
-  if (!gpu.empty() && settings.primary != Primary::Raster) {
-    return {Primary::Rays, fmt::format("by {}, as asked by --backend vulkan", gpu), true};
-  }
+  const bool by_device = settings.keys_by_device && !rounds_depth && !has_points && session.has_gpu_of_keys();
+  if (by_device && settings.primary != Primary::Raster) return {Primary::Rays, "by the device", true};
   if (settings.primary != Primary::Auto) return {settings.primary, "as asked"};
   KeyWork work{.triangles = session.scene().triangles,
                .own_triangles = mesh_triangles(session.scene()),
@@ -376,9 +374,10 @@ std::string refusal_of_light(const Session& session, const FramePlan& plan, std:
 }
 
 /// Whether a device lights, where one was asked for, and why not.
-void choose_light(const Session& session, FramePlan& plan, std::span<const View> views) {
-  if (!session.has_vulkan() || !needs_light(plan.rays.show)) return;
-  const std::string refusal = refusal_of_light(session, plan, views);
+void choose_light(const Session& session, const FrameSettings& settings, FramePlan& plan, std::span<const View> views) {
+  if (!session.has_device() || !needs_light(plan.rays.show)) return;
+  const std::string refusal =
+      settings.light_by_device ? refusal_of_light(session, plan, views) : "as what was lit before";
   plan.rays.on_device = refusal.empty();
   plan.explained.push_back(refusal.empty() ? "light: on the device" : fmt::format("light: by the CPU ({})", refusal));
 }
@@ -505,6 +504,8 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   plan.explained = explain_distribution(plan, settings, choice, ranks);
   plan.explained_distribution = plan.explained.size();
   if (ranks > 1) plan.explained.push_back(explain_balance(plan));
+  if (const std::string device = session.device_description(); !device.empty())
+    plan.explained.push_back(fmt::format("device: {}", device));
   plan.explained.push_back(
       fmt::format("primary: {} ({})", plan.primary == Primary::Rays ? "rays" : "raster", primary.why));
   if (plan.distribution == Distribution::SortMiddle) plan.explained.push_back(explain_binning(plan, ranks));
@@ -516,7 +517,7 @@ FramePlan plan_frame(Session& session, const FrameSettings& settings, std::span<
   explain_light(session, settings, plan);
   choose_indirect(session, settings, plan, views);
   fit_photons(session, settings, plan, views);
-  choose_light(session, plan, views);
+  choose_light(session, settings, plan, views);
   plan_areas(session, plan, views);
   for (const PassPlan& pass : plan_passes(session.requirements(), plan.rays)) explain_pass(pass, settings, plan);
   if (plan.verify_percent > 0.0) {

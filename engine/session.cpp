@@ -18,6 +18,7 @@
 #include "core/text.h"
 #include "core/timing.h"
 #include "engine/balance/load_balance.h"
+#include "engine/device/device_choice.h"
 #include "gpu/device/gpu_device.h"
 #include "gpu/gpu_primary_rays.h"
 #include "gpu/light/gpu_tile_shader.h"
@@ -89,6 +90,8 @@ Session::Session(Communicator& comm, const SessionSettings& settings, const std:
     start_vulkan();
   } else if (settings_.backend != "auto" || settings_.device >= 0) {
     start_gl();
+  } else {
+    find_device();
   }
 }
 
@@ -102,11 +105,50 @@ void Session::start_vulkan() {
         GpuOptions{.device = settings_.device, .local_rank = host_.local_rank, .software = true});
     gpu_primary_rays_ = std::make_unique<GpuPrimaryRays>(*gpu_, host_.threads);
   });
+  compare_devices();
+}
+
+void Session::find_device() {
+  const bool may_have_one = has_gpu_device();
+  if (std::ranges::count(all_gather_value(comm_, may_have_one ? 1 : 0), 1) == 0) return;  // Vulkan is not even opened
+  DeviceOffer mine{.host = host_.host, .problem = "no device of one"};
+  if (may_have_one) {
+    const trace::Span span("start Vulkan");
+    mine = start_offered(host_.host, host_.local_rank, [this](const GpuDevice::Choose& choose) {
+      gpu_ = std::make_unique<GpuDevice>(GpuOptions{}, choose);
+      gpu_primary_rays_ = std::make_unique<GpuPrimaryRays>(*gpu_, host_.threads);
+    });
+  }
+  const auto states = all_gather_value(comm_, mine.state);
+  const std::vector<std::string> hosts = all_gather_texts(comm_, mine.host);
+  const std::vector<std::string> problems = all_gather_texts(comm_, mine.problem);
+  std::vector<DeviceOffer> offers;
+  for (std::size_t rank = 0; rank < states.size(); ++rank)
+    offers.push_back({states[rank], hosts[rank], problems[rank]});
+  const DeviceChoice choice = choose_devices(offers);
+  if (choice.uses) return compare_devices();
+  gpu_primary_rays_.reset();
+  gpu_.reset();
+  no_device_ = choice.why;
+  if (choice.is_warning && comm_.rank() == 0) log::warning("{}: keys and light are made without Vulkan", choice.why);
+}
+
+/// What there is to say of the ranks' devices, and how much memory they have for each rank.
+void Session::compare_devices() {
   const GpuInfo& device = gpu_->info();
   log::debug("Vulkan: {}, {}", device.name, device.driver);
+  std::vector<DeviceOfRank> used;
+  const std::vector<std::string> hosts = all_gather_texts(comm_, host_.host);
+  const auto uuids = all_gather_value(comm_, device.uuid);
   const auto by_cpu = all_gather_value(comm_, device.software ? 1 : 0);
   const std::vector<std::string> devices = all_gather_texts(comm_, device.name + ", " + device.driver);
+  for (std::size_t rank = 0; rank < hosts.size(); ++rank) used.push_back({hosts[rank], uuids[rank], by_cpu[rank] != 0});
+  const std::size_t self = static_cast<std::size_t>(comm_.rank());
+  const auto together = std::ranges::count_if(
+      used, [&](const DeviceOfRank& each) { return each.host == used[self].host && each.uuid == used[self].uuid; });
+  device_bytes_ = std::ranges::min(all_gather_value(comm_, device.memory / static_cast<std::uint64_t>(together)));
   if (comm_.rank() != 0) return;
+  if (const std::string crowding = describe_crowding(used); !crowding.empty()) log::warning("{}", crowding);
   const auto other = std::ranges::find_if(devices, [&](const std::string& each) { return each != devices.front(); });
   if (other != devices.end()) {
     log::warning("rank {} has another device than rank 0 ({}; {}): pictures may differ in last bits, and at edges",
@@ -120,7 +162,8 @@ void Session::start_vulkan() {
     log::warning("Vulkan has no GPU for {} {}: the CPU does its work, slowly", ranks.size() == 1 ? "rank" : "ranks",
                  fmt::join(ranks, ", "));
   }
-  if (!fits_on_gpu(scene_)) log::warning("Embree makes the keys: no device takes parts of scenes");
+  if (!fits_on_gpu(scene_) && settings_.backend == kVulkan)
+    log::warning("Embree makes the keys: no device takes parts of scenes");
 }
 
 GpuPrimaryRays& Session::gpu_primary_rays(std::span<const SurfaceRange> objects) {
@@ -130,14 +173,31 @@ GpuPrimaryRays& Session::gpu_primary_rays(std::span<const SurfaceRange> objects)
   return *gpu_primary_rays_;
 }
 
-std::string Session::gpu_of_keys() const {
-  return gpu_ && fits_on_gpu(scene_) ? gpu_->info().name : "";
+/// Why the device takes nothing of this scene; empty: it does. Whoever names Vulkan gets an error where its memory
+/// ends.
+std::string Session::refusal_of_scene() const {
+  if (!fits_on_gpu(scene_)) return "no device takes parts of scenes";
+  if (settings_.backend == kVulkan) return {};
+  const std::uint64_t bytes = device_bytes_of(scene_);
+  if (bytes <= device_bytes_ / 2) return {};  // the rest is for pixels, photons and other programs
+  return fmt::format("the scene may take {} of the {} that a rank has there", format_bytes(bytes),
+                     format_bytes(device_bytes_));
+}
+
+bool Session::has_gpu_of_keys() const {
+  return gpu_ && refusal_of_scene().empty();
 }
 
 std::string Session::refusal_of_light(const RaySettings& settings) const {
   if (!gpu_) return "no device was asked for";
-  if (!fits_on_gpu(scene_)) return "no device takes parts of scenes";
+  if (const std::string refusal = refusal_of_scene(); !refusal.empty()) return refusal;
   return hpr::refusal_of_light(scene_, settings, plan_passes(requirements_, settings));
+}
+
+std::string Session::device_description() const {
+  if (!gpu_) return no_device_.empty() ? "" : fmt::format("none ({})", no_device_);
+  return fmt::format("{}, driver {} ({})", gpu_->info().name, gpu_->info().driver,
+                     settings_.backend == kVulkan ? "as asked by --backend vulkan" : "a GPU that Vulkan has");
 }
 
 void Session::start_gl() {

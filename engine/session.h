@@ -36,8 +36,8 @@ inline constexpr std::string_view kVulkan = "vulkan";
 
 /// What a session uses of the machine that each of its ranks runs on.
 struct SessionSettings {
-  std::string backend = "auto";  ///< OpenGL by it, see GlOptions; or kVulkan
-  int device = -1;               ///< of EGL or of Vulkan; -1: by local rank
+  std::string backend = "auto";  ///< OpenGL by it, see GlOptions; or kVulkan. "auto": keys and light by GPUs too
+  int device = -1;               ///< of Vulkan with kVulkan, else of EGL; -1: by local rank
   int threads = 0;               ///< of one rank; 0: the machine's cores divided among the ranks of a host
 };
 
@@ -45,7 +45,8 @@ struct SessionSettings {
 /// the frame's memory. One per rank; construction is collective.
 class Session {
  public:
-  /// `load` runs on rank 0 alone. Starts OpenGL where the settings name a backend or a device.
+  /// `load` runs on rank 0 alone. Starts OpenGL where the settings name a backend of it or a device, and GPUs where
+  /// they leave the choice and all ranks have one.
   Session(Communicator& comm, const SessionSettings& settings, const std::function<LoadedScene()>& load);
   ~Session();
   Session(const Session&) = delete;
@@ -103,13 +104,15 @@ class Session {
   /// The primary rays through `objects`; kept until other objects, another way of building, or another part of the
   /// scene are asked for. Collective where `settings` have a part, as shader() is.
   [[nodiscard]] PrimaryRays& primary_rays(std::span<const SurfaceRange> objects, const RaySettings& settings);
-  /// The name of the device that can make keys in place of primary_rays(); empty: settings name none, or the scene is
-  /// in parts, which devices do not take.
-  [[nodiscard]] std::string gpu_of_keys() const;
+  /// Whether this rank's device can make keys in place of primary_rays(): not scenes in parts.
+  [[nodiscard]] bool has_gpu_of_keys() const;
   /// That device, with `objects` on it.
   [[nodiscard]] GpuPrimaryRays& gpu_primary_rays(std::span<const SurfaceRange> objects);
-  /// Whether Vulkan was asked for.
-  [[nodiscard]] bool has_vulkan() const { return gpu_ != nullptr; }
+  /// Whether there is a device that keys and light may be made by.
+  [[nodiscard]] bool has_device() const { return gpu_ != nullptr; }
+  /// That device, its driver, and why it is used; where GPUs are not used though there are some, why: "none (...)".
+  /// Else empty.
+  [[nodiscard]] std::string device_description() const;
   /// Why no device lights by these settings; empty: one does (shader()).
   [[nodiscard]] std::string refusal_of_light(const RaySettings& settings) const;
   /// Those of all ranks' objects, beside the ones above where these hold fewer; kept until the scene changes. Not where
@@ -140,6 +143,9 @@ class Session {
 
  private:
   void start_vulkan();
+  void find_device();
+  void compare_devices();
+  [[nodiscard]] std::string refusal_of_scene() const;
   void compare_rasterizers();
   void warn_of_scene() const;
   /// Ends what was made with a group that has other members.
@@ -174,7 +180,9 @@ class Session {
   HostResources host_;
   Scene scene_;
   Requirements requirements_;
-  std::unique_ptr<GpuDevice> gpu_;  ///< null unless Vulkan was asked for
+  std::unique_ptr<GpuDevice> gpu_;  ///< null: none makes keys or light
+  std::string no_device_;           ///< why none does though there is one
+  std::uint64_t device_bytes_ = 0;  ///< of its memory for this rank, on the rank that has least of it
   std::unique_ptr<GlContext> gl_;   ///< null before start_gl()
   std::vector<SurfaceRange> objects_;
   std::unique_ptr<Rasterizer> rasterizer_;

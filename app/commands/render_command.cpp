@@ -143,14 +143,22 @@ class RenderCommand final : public Command {
     check_checkpoints(globals);
   }
 
-  /// On another machine, which has a GPU or has none, the choice may be another one; a checkpoint says which it was.
-  [[nodiscard]] Primary primary_before(Communicator& comm) const {
-    Primary primary = Primary::Auto;
+  /// Collective. On another machine, which has a GPU or has none, other choices may be made; a checkpoint says which
+  /// they were.
+  void choose_as_before(Communicator& comm, const Globals& globals, FrameSettings& chosen) const {
+    struct Before {
+      Primary primary = Primary::Auto;
+      bool by_device = false;
+    };
+    Before before;
     check_on_root(comm, [&] {
       const StoredCheckpoint stored = read_checkpoint(checkpoint_);
-      primary = primary_of(identity_in(stored.bytes, stored.path.string()));
+      const RunIdentity identity = identity_in(stored.bytes, stored.path.string());
+      before = {primary_of(identity), had_device(identity)};
     });
-    return all_gather_value(comm, primary).front();
+    before = all_gather_value(comm, before).front();
+    if (chosen.primary == Primary::Auto) chosen.primary = before.primary;
+    if (globals.backend == "auto" && !before.by_device) chosen.keys_by_device = chosen.light_by_device = false;
   }
 
   void print_plan(const FramePlan& plan) const {
@@ -181,7 +189,7 @@ class RenderCommand final : public Command {
     const Blocks blocks = cut_blocks(std::span(&view, 1), settings.frame.resolution_scale);
     FrameSettings chosen = settings.frame;
     chosen.single_picture = sampling.goal.one();
-    if (resume_ && chosen.primary == Primary::Auto) chosen.primary = primary_before(session.comm());
+    if (resume_) choose_as_before(session.comm(), globals, chosen);
     FramePlan plan = plan_frame(session, chosen, blocks.views);
     plan.lit = !files_.picture.empty() || !report_.stats.empty();
     const bool is_root = session.comm().rank() == 0;

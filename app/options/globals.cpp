@@ -54,7 +54,7 @@ void Globals::declare(const OptionSet& options) {
   options.option("--seed", seed, "of everything random").check(whole_number_problem).show_default().group(everywhere);
   options
       .option("--backend", backend,
-              "what draws: OpenGL by auto, egl or osmesa; or vulkan, whose devices make keys and light")
+              "what draws: OpenGL by egl or osmesa; vulkan, whose devices make keys and light; auto: that with a GPU")
       .show_default()
       .group(everywhere);
   options.option("--device", device, "device of EGL or Vulkan (default: by local rank)")

@@ -245,6 +245,8 @@ namespace {
 constexpr const char* kKeys = "way to keys";
 constexpr const char* kByRays = "by rays";
 constexpr const char* kByRaster = "by raster";
+constexpr const char* kDevice = "device";
+constexpr const char* kNoDevice = "none";
 
 /// Every bit of a view but its jitter, which belongs to the sample.
 std::string describe(const View& view) {
@@ -283,6 +285,8 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   identity.emplace_back("list of passes", fmt::format("'{}'", fmt::join(passes, ",")));
   identity.emplace_back("number of photons", fmt::format("{}", plan.rays.photons));
   identity.emplace_back(kKeys, plan.primary == Primary::Rays ? kByRays : kByRaster);
+  const bool uses_device = plan.keys_on_device || plan.rays.on_device;
+  identity.emplace_back(kDevice, uses_device ? session.device_description() : kNoDevice);
   for (const Setting& setting : all_settings()) {
     if (setting.decides_bits) {
       identity.emplace_back(fmt::format("--{}", setting.name), fmt::format("'{}'", setting.value.write(settings)));
@@ -302,6 +306,12 @@ Primary primary_of(const RunIdentity& identity) {
     if (value == kByRaster) return Primary::Raster;
   }
   return Primary::Auto;
+}
+
+bool had_device(const RunIdentity& identity) {
+  const auto device =
+      std::ranges::find(identity, kDevice, [](const RunIdentity::value_type& field) { return field.first; });
+  return device != identity.end() && device->second != kNoDevice;
 }
 
 }  // namespace hpr

@@ -72,4 +72,7 @@ void check_whole(std::span<const std::byte> bytes, const std::string& name);
 /// What made the keys of the run with this identity; Auto where the identity does not name it.
 [[nodiscard]] Primary primary_of(const RunIdentity& identity);
 
+/// Whether a device made keys or light of the run with this identity.
+[[nodiscard]] bool had_device(const RunIdentity& identity);
+
 }  // namespace hpr

@@ -130,5 +130,11 @@ TEST(Checkpoint, ARightSumOverWrongContentIsRefusedToo) {
   EXPECT_NE(refusal(encode_checkpoint(kIdentity, other, {})).find("damaged"), std::string::npos);
 }
 
+TEST(Checkpoint, SaysWhetherADeviceMadeKeysOrLight) {
+  EXPECT_FALSE(had_device({{"device", "none"}}));
+  EXPECT_FALSE(had_device({{"seed", "1"}}));
+  EXPECT_TRUE(had_device({{"seed", "1"}, {"device", "card 1, driver 2"}}));
+}
+
 }  // namespace
 }  // namespace hpr

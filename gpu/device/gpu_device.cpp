@@ -284,8 +284,11 @@ GpuInfo choose_gpu(const std::vector<GpuInfo>& gpus, const GpuOptions& options) 
 }
 
 GpuDevice::GpuDevice(const GpuOptions& options)
+    : GpuDevice(options, [&](const std::vector<GpuInfo>& gpus) { return choose_gpu(gpus, options); }) {}
+
+GpuDevice::GpuDevice(const GpuOptions& options, const Choose& choose)
     : instance_(std::make_unique<Instance>(options.validate)), limit_(options.limit) {
-  info_ = choose_gpu(infos_of(instance_->vk, instance_->devices), options);
+  info_ = choose(infos_of(instance_->vk, instance_->devices));
   auto* const physical = instance_->devices[static_cast<std::size_t>(info_.index)];
   functions_ = std::make_unique<VulkanFunctions>(instance_->vk);
   vk_ = functions_.get();

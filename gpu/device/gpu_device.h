@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -49,6 +50,11 @@ class GpuDevice {
  public:
   /// Throws Error: NoDevice without a device as asked for, with what was found; Usage for an index there is not.
   explicit GpuDevice(const GpuOptions& options);
+  /// Chooses one of all devices of the machine; throws Error for none.
+  using Choose = std::function<GpuInfo(const std::vector<GpuInfo>&)>;
+  /// Starts the device that `choose` returns, in place of choose_gpu(). What that throws goes on; Error (NoDevice)
+  /// where the device does not start.
+  GpuDevice(const GpuOptions& options, const Choose& choose);
   ~GpuDevice();
   GpuDevice(const GpuDevice&) = delete;
   GpuDevice& operator=(const GpuDevice&) = delete;
