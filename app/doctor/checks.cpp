@@ -5,6 +5,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -255,21 +256,24 @@ Finding try_backend(const std::string& backend) {
 
 /// One finding for all: hpr draws without any.
 Finding list_gpus() {
+  Finding finding;
   try {
-    std::string list;
-    bool computes = false;
-    for (const GpuInfo& gpu : find_gpus()) {
-      computes = computes || gpu.lacks.empty();
-      list += fmt::format("{}{}: {}, {}, {}{}", list.empty() ? "" : "; ", gpu.index, gpu.name, gpu.driver,
-                          format_bytes(gpu.memory), gpu.software ? " (software)" : "");
-      if (!gpu.lacks.empty()) list += fmt::format(" (lacks {})", gpu.lacks);
-    }
-    if (!computes)
-      return warn(list.empty() ? "no device" : list, "install the driver of the GPU, or mesa-vulkan-drivers");
-    return ok(list);
+    for (const GpuInfo& gpu : find_gpus()) finding.devices.push_back(judge(gpu));
   } catch (const Error& error) {
     return warn(error.what(), error.hint());
   }
+  const auto by = [&](std::string_view backend) {
+    return std::ranges::count(finding.devices, backend, &DeviceFinding::backend);
+  };
+  finding.detail = fmt::format("{} device{}, {}", finding.devices.size(), finding.devices.size() == 1 ? "" : "s",
+                               by("auto") > 0     ? "keys and light are made by a GPU"
+                               : by("vulkan") > 0 ? "no GPU for keys and light: they are made without, unless asked for"
+                                                  : "none that hpr can use");
+  if (by("auto") + by("vulkan") == 0) {
+    finding.status = FindingStatus::Warn;
+    finding.remedy = "install the driver of the GPU, or mesa-vulkan-drivers";
+  }
+  return finding;
 }
 
 /// One backend is enough; without any nothing can be drawn.
@@ -279,6 +283,18 @@ Finding any_backend() {
 }
 
 }  // namespace
+
+DeviceFinding judge(const GpuInfo& gpu) {
+  DeviceFinding device{gpu.index, printable(gpu.name), printable(gpu.driver), gpu.memory, gpu.software, {}, {}, {}};
+  if (!gpu.lacks.empty()) {
+    device.why = "lacks " + gpu.lacks;
+    return device;
+  }
+  device.use = {"keys", "light"};
+  device.backend = gpu.software ? "vulkan" : "auto";
+  if (gpu.software) device.why = "software: the CPU does its work, slowly";
+  return device;
+}
 
 std::vector<Check> graphics_checks() {
   std::vector<Check> checks;

@@ -1,6 +1,7 @@
 #include "app/doctor/doctor.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "core/error.h"
 #include "core/job_environment.h"
 #include "core/json.h"
+#include "core/text.h"
 
 namespace hpr {
 namespace {
@@ -59,6 +61,29 @@ bool healthy(std::span<const Finding> findings) {
   return std::ranges::none_of(findings, [](const Finding& f) { return f.status == FindingStatus::Fail; });
 }
 
+namespace {
+
+std::string describe(const DeviceFinding& device) {
+  return fmt::format("{}: {}, driver {}, {}: {}{}{}", device.index, device.name, device.driver,
+                     format_bytes(device.memory_bytes),
+                     device.use.empty() ? "of no use" : fmt::format("{}", fmt::join(device.use, " and ")),
+                     device.backend.empty() ? "" : " by --backend " + device.backend,
+                     device.why.empty() ? "" : fmt::format(" ({})", device.why));
+}
+
+Json to_json(const DeviceFinding& device) {
+  return {{"index", device.index},
+          {"name", device.name},
+          {"driver", device.driver},
+          {"memory_bytes", device.memory_bytes},
+          {"software", device.software},
+          {"use", device.use},
+          {"backend", device.backend.empty() ? Json() : Json(device.backend)},
+          {"why", device.why}};
+}
+
+}  // namespace
+
 std::string findings_text(std::span<const Finding> findings, bool colors) {
   std::size_t width = 0;
   for (const Finding& finding : findings) width = std::max(width, finding.name.size());
@@ -67,6 +92,8 @@ std::string findings_text(std::span<const Finding> findings, bool colors) {
     const StatusStyle style = style_of(finding.status);
     text += fmt::format("{}{:<4}{}  {:<{}}  {}\n", colors ? style.color : "", style.text, colors ? "\x1b[0m" : "",
                         finding.name, width, finding.detail);
+    for (const DeviceFinding& device : finding.devices)
+      text += fmt::format("{:{}}{}\n", "", width + 8, describe(device));
     if (!finding.remedy.empty()) text += fmt::format("{:{}}-> {}\n", "", width + 8, finding.remedy);
   }
   return text;
@@ -75,10 +102,12 @@ std::string findings_text(std::span<const Finding> findings, bool colors) {
 std::string findings_json(std::span<const Finding> findings) {
   Json json{{"schema", "hpr.doctor/1"}, {"healthy", healthy(findings)}, {"findings", Json::array()}};
   for (const Finding& finding : findings) {
-    json["findings"].push_back({{"name", finding.name},
-                                {"status", style_of(finding.status).text},
-                                {"detail", finding.detail},
-                                {"remedy", finding.remedy}});
+    Json made{{"name", finding.name},
+              {"status", style_of(finding.status).text},
+              {"detail", finding.detail},
+              {"remedy", finding.remedy}};
+    for (const DeviceFinding& device : finding.devices) made["devices"].push_back(to_json(device));
+    json["findings"].push_back(std::move(made));
   }
   return json.dump(2) + "\n";
 }

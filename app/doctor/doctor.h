@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -14,11 +15,24 @@ struct Globals;
 /// What a check found: green, yellow (works, but something is slower or missing) or red (hpr cannot do its work).
 enum class FindingStatus { Ok, Warn, Fail };
 
+/// A device that Vulkan knows, and what hpr would use it for.
+struct DeviceFinding {
+  int index = 0;  ///< of --device
+  std::string name;
+  std::string driver;
+  std::uint64_t memory_bytes = 0;
+  bool software = false;         ///< the CPU does its work
+  std::vector<std::string> use;  ///< "keys" and "light", or nothing
+  std::string backend;           ///< the --backend that uses it unasked ("auto") or as asked ("vulkan"); empty: none
+  std::string why;               ///< why not for more
+};
+
 struct Finding {
   std::string name;
   FindingStatus status = FindingStatus::Ok;
   std::string detail;  ///< what is there, one line
   std::string remedy;  ///< the command or step that mends it; empty when nothing needs mending
+  std::vector<DeviceFinding> devices = {};
 };
 
 /// One thing to look at. A check that throws is red, with the error's message and hint.
@@ -50,6 +64,10 @@ struct Check {
 
 /// One check per GL backend of this build: does a context come up, and on what? Red only when none does.
 [[nodiscard]] std::vector<Check> graphics_checks();
+
+struct GpuInfo;
+/// What hpr would use a device for.
+[[nodiscard]] DeviceFinding judge(const GpuInfo& gpu);
 
 /// The machine a figure was measured on, as reports name it.
 struct Machine {

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/json.h"
+#include "gpu/device/gpu_device.h"
 
 namespace hpr {
 namespace {
@@ -94,6 +95,44 @@ TEST(Doctor, LooksAtTheFolderWhereTemporaryFilesGo) {
   EXPECT_EQ(finding.status, FindingStatus::Warn);
   EXPECT_NE(finding.detail.find("/nonexistent/folder"), std::string::npos) << finding.detail;
   EXPECT_NE(finding.remedy.find("TMPDIR"), std::string::npos) << finding.remedy;
+}
+
+GpuInfo card(bool software, const std::string& lacks) {
+  GpuInfo info;
+  info.index = 3;
+  info.name = "card";
+  info.driver = "580";
+  info.memory = std::uint64_t{80} << 30U;
+  info.software = software;
+  info.lacks = lacks;
+  return info;
+}
+
+TEST(Doctor, SaysWhatDevicesAreUsedFor) {
+  const DeviceFinding good = judge(card(false, ""));
+  EXPECT_EQ(good.use, (std::vector<std::string>{"keys", "light"}));
+  EXPECT_EQ(good.backend, "auto");
+  EXPECT_EQ(good.why, "");
+  EXPECT_EQ(judge(card(true, "")).backend, "vulkan") << "software is used where it is asked for";
+  const DeviceFinding lacking = judge(card(false, "shaderFloat64"));
+  EXPECT_TRUE(lacking.use.empty() && lacking.backend.empty());
+  EXPECT_EQ(lacking.why, "lacks shaderFloat64");
+
+  std::vector<Finding> findings{{"Vulkan", FindingStatus::Ok, "2 devices", {}, {good, lacking}}};
+  const std::string text = findings_text(findings, false);
+  EXPECT_NE(text.find("3: card, driver 580, 80 GiB: keys and light by --backend auto\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("of no use (lacks shaderFloat64)\n"), std::string::npos) << text;
+  const Json all = Json::parse(findings_json(findings));
+  const Json& json = all["findings"][0]["devices"];
+  ASSERT_EQ(json.size(), 2U);
+  ASSERT_EQ(json[0]["use"].size(), 2U);
+  EXPECT_EQ(json[0]["use"][1].get<std::string>(), "light");
+  EXPECT_EQ(json[0]["memory_bytes"].get<std::uint64_t>(), 85899345920U);
+  EXPECT_TRUE(json[1]["backend"].is_null());
+  EXPECT_EQ(json[1]["why"].get<std::string>(), "lacks shaderFloat64");
+  findings.front().devices.clear();
+  EXPECT_FALSE(Json::parse(findings_json(findings))["findings"][0].contains("devices"))
+      << "what other findings have not";
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "rt/deferred_shader.h"
 #include "rt/passes/pass_list.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/bench_device.h"
 #include "tools/bench/bench_raster.h"
 #include "tools/bench/bench_rays.h"
 #include "tools/sweep.h"
@@ -69,8 +70,7 @@ struct WorldMesh {
 };
 
 double bare_gl_ms(const Globals& globals, int threads, const WorldMesh& mesh, const View& view, int frames) {
-  const auto context =
-      make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
+  const auto context = make_gl_context(gl_options(globals, threads));
   BareGl bare(*context, mesh.positions, mesh.triangles, glm::mat4(clip_from_world(view, {0.0, 0.0, 0.0})), view.size(),
               fastest_route(*context));
   // Two frames to warm up: shaders are compiled at the first draw.
@@ -188,7 +188,10 @@ class Bench {
   }
 
   [[nodiscard]] BenchRow keys_row(double floor_ms_of_sample) const {
-    return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles, by_rays() ? " by rays" : ""),
+    return row_of(fmt::format("keys of {} triangles{}", session_.scene().triangles,
+                              plan_.keys_on_device ? " by rays of the device"
+                              : by_rays()          ? " by rays"
+                                                   : ""),
                   median_of(frames_, [](const Measured& frame) { return frame.times.primary_ms; }),
                   floor_ms_of_sample * frames_.front().times.samples);
   }

@@ -19,6 +19,7 @@
 #include "raster/rasterizer.h"
 #include "scene/view.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/bench_device.h"
 #include "tools/sweep.h"
 
 namespace hpr {
@@ -43,7 +44,8 @@ View view_of(const Scene& scene) {
 }
 
 /// A sphere's keys against the fastest route of the bare loop, then each route against that one.
-std::vector<BenchRow> bench_sphere(GlContext& context, std::uint32_t rows, std::uint32_t columns, int threads) {
+std::vector<BenchRow> bench_sphere(GlContext& context, const GpuDevice* device, std::uint32_t rows,
+                                   std::uint32_t columns, int threads) {
   Scene scene;
   scene.meshes.push_back(displaced_sphere(rows, columns));
   scene.instances.push_back({});
@@ -72,15 +74,19 @@ std::vector<BenchRow> bench_sphere(GlContext& context, std::uint32_t rows, std::
     const double ms = medians[2 + i];
     table.push_back({fmt::format("bare, read by {}", route_name(all_key_routes()[i])), ms, floor, "ms", floor / ms});
   }
+  if (device != nullptr)
+    std::ranges::copy(bench_device_keys(*device, scene, view, threads, medians[0]), std::back_inserter(table));
   return table;
 }
 
 /// A frame of keys (cull, draw, read back, pack) against the barest GL loop: one glDrawElements of the same mesh into
 /// the same formats, brought into memory by the fastest of all routes. A displaced sphere of about 250 000 and
 /// 1 000 000 triangles at 1920x1080, all sides in turn, medians in ms. Takes some seconds.
-std::vector<BenchRow> bench_raster(GlContext& context, int threads) {
-  std::vector<BenchRow> rows = bench_sphere(context, 354, 354, threads);
-  std::ranges::copy(bench_sphere(context, 708, 708, threads), std::back_inserter(rows));
+/// With a device its keys of the same view too, against OpenGL's.
+std::vector<BenchRow> bench_raster(GlContext& context, const GpuDevice* device, int threads) {
+  context.make_current();
+  std::vector<BenchRow> rows = bench_sphere(context, device, 354, 354, threads);
+  std::ranges::copy(bench_sphere(context, device, 708, 708, threads), std::back_inserter(rows));
   return rows;
 }
 
@@ -88,16 +94,17 @@ class BenchRasterCommand final : public Command {
  public:
   [[nodiscard]] std::string_view name() const override { return "raster"; }
   [[nodiscard]] std::string_view summary() const override {
-    return "a frame with raster only against a bare GL loop of the same mesh, read by the fastest route";
+    return "a frame with raster only against a bare GL loop of the same mesh, read by the fastest route; with "
+           "--backend vulkan a device's keys too";
   }
 
   void declare(const OptionSet& options) override { options.flag("--json", json_, "one JSON document"); }
 
   [[nodiscard]] ExitCode run(const Globals& globals) override {
     const int threads = globals.threads > 0 ? globals.threads : usable_cores();
-    const auto context =
-        make_gl_context({.backend = globals.backend, .device = globals.device, .local_rank = 0, .threads = threads});
-    print_bench(bench_raster(*context, threads), context->description(), json_);
+    const std::unique_ptr<GpuDevice> device = measures_device(globals) ? device_of(globals) : nullptr;
+    const auto context = make_gl_context(gl_options(globals, threads));
+    print_bench(bench_raster(*context, device.get(), threads), context->description(), json_);
     return ExitCode::Done;
   }
 

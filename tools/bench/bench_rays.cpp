@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <span>
 
@@ -23,6 +24,7 @@
 #include "rt/trace/surfaces.h"
 #include "scene/view.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/bench_device.h"
 #include "tools/sweep.h"
 
 namespace hpr {
@@ -220,18 +222,59 @@ std::vector<RaySet> make_sets(const Scene& scene, const RayScene& rays, const Vi
   return sets;
 }
 
-/// bench_rays of a picture of `side` x `side` pixels by the scene's first camera.
-std::vector<BenchRow> bench_picture(const Scene& scene, int side, const RayBuild& build) {
+/// What bare Embree takes for a set, best of some tries, and the set in the world, as devices have it.
+DeviceRays for_device(std::string_view name, const RayScene& scene, const RaySet& set) {
+  const DenormalsAsZero mode;
+  const RaySpace& space = scene.space();
+  DeviceRays made{name, set.query == Query::Closest ? GpuRayBatch::Query::Closest : GpuRayBatch::Query::AnyHit, {}};
+  for (const BenchRay& ray : set.rays) {
+    made.rays.push_back({space.origin + ray.origin / space.scale, ray.direction, ray.max_distance / space.scale});
+  }
+  BareRays bare(scene, set);
+  made.embree_ms = kInfinity;
+  for (int i = 0; i < kTries; ++i) {
+    const double start = thread_ms();
+    made.embree_hits = bare.trace(0, set.rays.size());
+    made.embree_ms = std::min(made.embree_ms, thread_ms() - start);
+  }
+  return made;
+}
+
+/// Primary rays, and diffuse ones of both queries, on a device.
+std::vector<BenchRow> bench_on_device(const GpuDevice& device, const Scene& scene, const RayScene& rays,
+                                      const View& view) {
+  std::vector<DeviceRays> sets;
+  for (RaySet& set : make_sets(scene, rays, view)) {
+    if (set.rays.empty()) continue;
+    if (set.pattern == RayPattern::Primary) sets.push_back(for_device("primary", rays, set));
+    if (set.pattern != RayPattern::Diffuse) continue;
+    sets.push_back(for_device("diffuse", rays, set));
+    set.query = Query::Occluded;
+    sets.push_back(for_device("diffuse, any hit", rays, set));
+  }
+  std::vector<BenchRow> rows = bench_device_rays(device, scene, sets);
+  const std::vector<BenchRow> read = bench_read_back(device);
+  rows.insert(rows.end(), read.begin(), read.end());
+  return rows;
+}
+
+/// bench_rays of a picture of `side` x `side` pixels by the scene's first camera; on a device as well, unless null.
+std::vector<BenchRow> bench_picture(const Scene& scene, int side, const RayBuild& build, const GpuDevice* device) {
   const RayScene rays(scene, RaySpace(scene), 1, std::array{SurfaceRange{0, scene.triangles}}, build);
   const Camera camera = scene.cameras.empty() ? framing_camera(scene) : scene.cameras.front();
-  return bench_rays(scene, rays, make_view(camera, {side, side}, scene.bounds));
+  const View view = make_view(camera, {side, side}, scene.bounds);
+  std::vector<BenchRow> rows = bench_rays(scene, rays, view);
+  if (device == nullptr) return rows;
+  const std::vector<BenchRow> more = bench_on_device(*device, scene, rays, view);
+  rows.insert(rows.end(), more.begin(), more.end());
+  return rows;
 }
 
 class BenchRaysCommand final : public Command {
  public:
   [[nodiscard]] std::string_view name() const override { return "rays"; }
   [[nodiscard]] std::string_view summary() const override {
-    return "rays of one thread as passes trace them, against a bare Embree loop";
+    return "rays of one thread as passes trace them, and with --backend vulkan a device's, against a bare Embree loop";
   }
 
   void declare(const OptionSet& options) override {
@@ -254,7 +297,8 @@ class BenchRaysCommand final : public Command {
                   fmt::format("use --side {}", side_ / kTileSide * kTileSide));
     }
     const Scene scene = scene_.empty() ? ray_bench_scene(triangles_) : load_scene(scene_, globals.scene_limits());
-    print_bench(bench_picture(scene, side_, build), this_machine().cpu, json_);
+    const std::unique_ptr<GpuDevice> device = measures_device(globals) ? device_of(globals) : nullptr;
+    print_bench(bench_picture(scene, side_, build, device.get()), this_machine().cpu, json_);
     return ExitCode::Done;
   }
 
