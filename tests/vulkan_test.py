@@ -7,12 +7,16 @@ Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
 """
 
 import json
+import os
 import pathlib
 import struct
 import sys
 import tempfile
 
 from program import expect, failures, run
+
+# What devices are compared with is the CPU's and OpenGL's, on machines with a GPU as well.
+NO_VULKAN = {**os.environ, "VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
 
 SIZE = (96, 72)
 OTHERS = 0.0005  # of the pixels may show another surface
@@ -23,7 +27,7 @@ SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "
 
 
 def hpr(folder, *arguments, code=0):
-    result = run(folder, *arguments)
+    result = run(folder, *arguments, env=None if "vulkan" in arguments else NO_VULKAN)
     expect(result.returncode == code, f"{' '.join(arguments)}: left with {result.returncode}: {result.stderr[-800:]}")
     return result
 
@@ -79,6 +83,22 @@ def spreads(folder):
             expect(render(folder, "gen:gallery", *lit, *kind, *spread) == alone, f"other bits with {' '.join(kind + spread)}")
 
 
+def left_open(folder):
+    """--backend auto: without a GPU as ever, with one as --backend vulkan."""
+    devices = next(f for f in json.loads(run(folder, "doctor", "--json").stdout)["findings"] if f["name"] == "Vulkan")["devices"]
+    expect(all(set(d) == {"index", "name", "driver", "memory_bytes", "software", "use", "backend", "why"} for d in devices), f"devices: {devices}")
+    by_gpu = any(device["backend"] == "auto" for device in devices)
+    settings = ("render", "gen:cornell", "--size", "64x48", "--spp", "1", "--quality", "draft", "--explain", "--force", "-o")
+    for arguments in ((), ("--ranks", "2")):
+        said = run(folder, *settings, "auto.png", *arguments)
+        words = said.stdout + said.stderr
+        expect(("device: " in words) == by_gpu and "Vulkan" not in said.stderr, f"auto with GPUs {by_gpu}: {words[-800:]}")
+        expect(("light: on the device" in words) == by_gpu, f"auto with GPUs {by_gpu}: {words[-800:]}")
+    if not by_gpu:
+        hpr(folder, *settings, "cpu.png")
+        expect((folder / "auto.png").read_bytes() == (folder / "cpu.png").read_bytes(), "auto is another picture where there is no GPU")
+
+
 def said_and_done(folder):
     said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "b.png", "--backend", "vulkan", "--explain")
     words = said.stdout + said.stderr
@@ -120,6 +140,7 @@ def main():
         keys_of_scenes(folder)
         light_of_scenes(folder)
         spreads(folder)
+        left_open(folder)
         said_and_done(folder)
     return 1 if failures else 0
 
