@@ -180,7 +180,9 @@ std::string lines_of(int rank, const std::string& host, const trace::Record& rec
            {"args", {{"sort_index", process}}}});
     }
     if (rows.insert({process, event.lane}).second) {
-      const std::string name = event.lane == 0 ? "main" : fmt::format("thread {}", event.lane);
+      const std::string name = event.lane == 0                    ? "main"
+                               : event.lane == trace::kDeviceLane ? "device"
+                                                                  : fmt::format("thread {}", event.lane);
       add(named("thread_name", process, event.lane, name));
     }
     Json line{{"name", event.name},

@@ -3,7 +3,10 @@
 #include <atomic>
 #include <chrono>
 #include <ctime>
+#include <functional>
 #include <mutex>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "core/job_board.h"
@@ -26,6 +29,16 @@ std::mutex mutex;
 Record record;  // NOLINT(cert-err58-cpp): an empty vector
 
 thread_local Row this_row;
+
+void add(const Event& event) {
+  const std::lock_guard lock(mutex);
+  if (!on.load()) return;
+  if (record.events.size() >= kMaxEvents) {
+    ++record.dropped;
+  } else {
+    record.events.push_back(event);
+  }
+}
 
 }  // namespace
 
@@ -62,13 +75,18 @@ Span::~Span() {
   report_phase(around_);
   if (!records_) return;
   event_.end_ns = now_ns();
-  const std::lock_guard lock(mutex);
-  if (!on.load()) return;
-  if (record.events.size() >= kMaxEvents) {
-    ++record.dropped;
-  } else {
-    record.events.push_back(event_);
+  add(event_);
+}
+
+void add_device_span(const std::string& name, std::int64_t begin_ns, std::int64_t end_ns) {
+  if (!recording()) return;
+  static std::set<std::string, std::less<>> names;  // that events point at
+  const char* kept = nullptr;
+  {
+    const std::lock_guard lock(mutex);
+    kept = names.insert(name).first->c_str();
   }
+  add({kept, begin_ns, end_ns, this_row.rank, kDeviceLane});
 }
 
 Row row_of_this_thread() {

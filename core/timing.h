@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace hpr {
@@ -87,6 +88,13 @@ struct Row {
   int lane = 0;
 };
 [[nodiscard]] Row row_of_this_thread();
+
+/// The lane of what a device does for a rank: past all threads, and the one that shows pictures.
+inline constexpr int kDeviceLane = 1026;
+
+/// Adds what was done in that lane for this thread's rank, and timed otherwise. In one lane, spans do not overlap in
+/// part. `name` may be any text.
+void add_device_span(const std::string& name, std::int64_t begin_ns, std::int64_t end_ns);
 
 /// While it lives, what this thread does stands in that row.
 class InRow {

@@ -193,13 +193,14 @@ bool is_indirect(const PassInfo& pass) {
 
 }  // namespace
 
-std::vector<std::string> degradations_for(const FrameSettings& settings, std::span<const PassPlan> passes) {
+std::vector<std::string> degradations_for(const FrameSettings& settings, std::span<const PassPlan> passes,
+                                          bool on_device) {
   std::vector<std::string> names;
   if (settings.rays.reference) return names;
   const bool shares_otherwise = settings.rays.denoise || runs_pass(passes, [](const PassInfo& pass) {
                                   return pass.half_resolution.components == 0;
                                 });
-  if (settings.shading == Shading::Deferred && !shares_otherwise) names.emplace_back(kHalfResolution);
+  if (settings.shading == Shading::Deferred && !shares_otherwise && !on_device) names.emplace_back(kHalfResolution);
   if (runs_pass(passes, is_indirect)) names.emplace_back(kNoPhotons);
   const bool costly = settings.rays.glossy_cutoff > kCheapCutoff || settings.rays.max_depth > kCheapDepth;
   if (costly && runs_pass(passes, [](const PassInfo& pass) { return pass.lobe.has_value(); })) {

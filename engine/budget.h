@@ -97,9 +97,10 @@ class FrameBudget {
 
 /// What a frame of these settings may do without, in the order in which it is given up: "half-resolution" of all passes
 /// that have one, "photons", "glossy-cutoff" (and chains of reflections past the second). `passes`: those of the
-/// frame's plan; what would save nothing is left out.
-[[nodiscard]] std::vector<std::string> degradations_for(const FrameSettings& settings,
-                                                        std::span<const PassPlan> passes);
+/// frame's plan; what would save nothing is left out. `on_device`: whether a device lights; it does not at half
+/// resolution, and a frame that the CPU lights instead would take longer.
+[[nodiscard]] std::vector<std::string> degradations_for(const FrameSettings& settings, std::span<const PassPlan> passes,
+                                                        bool on_device = false);
 
 /// The settings with these degradations made.
 [[nodiscard]] FrameSettings apply_degradations(FrameSettings settings, std::span<const std::string> degradations);

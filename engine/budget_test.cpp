@@ -163,6 +163,7 @@ const std::vector<PassPlan> kAllRun{
 TEST(Degradations, AreThoseThatSaveSomething) {
   EXPECT_EQ(degradations_for({}, kAllRun), (Names{"half-resolution", "photons", "glossy-cutoff"}));
   EXPECT_EQ(degradations_for({}, {}), (Names{"half-resolution"}));
+  EXPECT_EQ(degradations_for({}, kAllRun, true), (Names{"photons", "glossy-cutoff"})) << "the light leaves its device";
   FrameSettings local;
   local.shading = Shading::Local;
   EXPECT_EQ(degradations_for(local, {}), Names{});

@@ -48,7 +48,8 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   if (resting) resting_.goal = *resting;
   plan_for({}, screens);
   if (!target_ms_) return;
-  // Whatever the size of a frame, it has as many photons and takes its keys the same way: the shader stays.
+  // Whatever the size of a frame and whatever is given up, it has as many photons and takes its keys and its light the
+  // same way: the shader stays, and times of a device and of the CPU are not mixed.
   settings_.photons_fit_frame = false;
   settings_.rays.photons = plan_.rays.photons;
   settings_.rays.photon_footprint = plan_.rays.photon_footprint;
@@ -57,7 +58,9 @@ FrameMaker::FrameMaker(Session& session, FrameSettings settings, const Sampling&
   settings_.distribution = plan_.distribution;
   settings_.rays.gather = plan_.rays.gather;
   settings_.indirect_is_chosen = true;
-  degradations_ = degradations_for(settings_, plan_passes(session.requirements(), plan_.rays));
+  settings_.keys_by_device = plan_.keys_on_device;
+  settings_.light_by_device = plan_.rays.on_device;
+  degradations_ = degradations_for(settings_, plan_passes(session.requirements(), plan_.rays), plan_.rays.on_device);
   budget_.emplace(BudgetSettings{
       .target_ms = *target_ms_, .max_samples = max_samples(), .degradations = static_cast<int>(degradations_.size())});
   std::vector<std::string> explained = plan_.explained;

@@ -58,7 +58,9 @@ Image<Key> GpuKeys::draw(const GpuScene& scene, const View& view) {
 
 void GpuKeys::draw_band(const GpuScene& scene, const View& band, std::span<Key> pixels) {
   view_.mapped<GpuView>()[0] = as_read(band);
+  batch_.begin_pass("device keys");
   batch_.run(kernel_, pixels.size(), Constants{keys_->address(), view_.address(), scene.address()});
+  batch_.begin_pass("device read-back");
   batch_.copy(*keys_, *read_, pixels.size_bytes());
   batch_.submit();
   batch_.wait();

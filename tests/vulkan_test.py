@@ -99,6 +99,39 @@ def left_open(folder):
         expect((folder / "auto.png").read_bytes() == (folder / "cpu.png").read_bytes(), "auto is another picture where there is no GPU")
 
 
+def device_row(folder):
+    """--trace has the device's passes in a row of their own, one after the other."""
+    hpr(folder, "render", "gen:cornell", "--size", "64x48", "--spp", "2", "--quality", "draft", "-o", "t.png", "--backend", "vulkan", "--trace", "t.json")
+    events = json.loads((folder / "t.json").read_text())["traceEvents"]
+    row = [e["tid"] for e in events if e["ph"] == "M" and e["name"] == "thread_name" and e["args"]["name"] == "device"]
+    expect(len(row) == 1, f"rows of the device: {row}")
+    spans = sorted((e for e in events if e["ph"] == "X" and e["tid"] in row), key=lambda e: (e["ts"], e["ts"] + e["dur"]))
+    has_clock = any(e["name"] != "device" for e in spans)
+    wanted = {"device keys", "device read-back", "device start", "device direct", "device finish"} if has_clock else {"device"}
+    expect(wanted <= {e["name"] for e in spans}, f"passes: { {e['name'] for e in spans} }")
+    expect(all(a["ts"] + a["dur"] <= b["ts"] + 1e-3 for a, b in zip(spans, spans[1:])), "passes of one device overlap")
+    light = [e for e in events if e["ph"] == "X" and e["name"] == "light"]
+    lit = [s for s in spans if s["name"] == ("device direct" if has_clock else "device")]
+    inside = [s for s in lit if any(e["ts"] <= s["ts"] and s["ts"] + s["dur"] <= e["ts"] + e["dur"] + 1 for e in light)]
+    expect(inside, "no light while the device lights")
+
+
+def target_time(folder):
+    """What is given up for time leaves light where it is."""
+    (folder / "walk.txt").write_text("eye -4,1.7,4 at 0,1.6,-2\n\neye 4,1.7,3 at 2,1.5,-2 fov 60\n")
+    walk = ("wall", "run", "2x1@40x32", "gen:gallery", "--quality", "draft", "--path", "walk.txt", "--frames", "8", "--target-ms", "0.5",
+            "--backend", "vulkan", "--stats", "b.json", "-o", "walk", "--force", "--explain")
+    for settings, by_device in ((("--spp", "1"), True), (("--spp", "2", "--half-resolution", "shadow"), False)):
+        said = hpr(folder, *walk, *settings)
+        expect(("light: on the device" in said.stdout) == by_device, f"{settings}: {said.stdout[-600:]}")
+        frames = [f["budget"] for f in json.loads((folder / "walk" / "manifest.json").read_text())["frames"]]
+        expect(frames[-1]["resolution_scale"] < 0.3, f"{settings}: given up: {frames[-1]}")
+        given_up = any("half-resolution" in f["given_up"] for f in frames)
+        expect(given_up != by_device, f"{settings}: half resolution in {frames}")
+        lit = {p["name"]: p["ms"] for p in json.loads((folder / "b.json").read_text())["passes"]}
+        expect((lit.get("device direct", 0) > 0) == by_device, f"{settings}: the last frame's light: {lit}")
+
+
 def said_and_done(folder):
     said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "b.png", "--backend", "vulkan", "--explain")
     words = said.stdout + said.stderr
@@ -141,6 +174,8 @@ def main():
         light_of_scenes(folder)
         spreads(folder)
         left_open(folder)
+        device_row(folder)
+        target_time(folder)
         said_and_done(folder)
     return 1 if failures else 0
 

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/timing.h"
 
 namespace hpr {
 namespace {
@@ -152,6 +153,7 @@ void GpuBatch::submit() {
   work.pSignalSemaphores = &semaphore_;
   device_.check(vk.QueueSubmit(device_.queue(), 1, &work, VK_NULL_HANDLE), "submitting a batch");
   submitted_ = done;
+  submitted_ns_ = trace::now_ns();
   in_flight_ = true;
 }
 
@@ -167,6 +169,26 @@ void GpuBatch::wait() {
   in_flight_ = result == VK_TIMEOUT;
   device_.check(result, "computing");
   read_times();
+  trace_times();
+}
+
+/// The passes as they follow one another up to now, when the device was found to be done; at least after they were
+/// submitted, as the clocks differ. All as one where it has no clock.
+void GpuBatch::trace_times() const {
+  if (!trace::recording()) return;
+  const std::int64_t now = trace::now_ns();
+  if (times_.empty()) return trace::add_device_span("device", submitted_ns_, now);
+  double all_ms = 0.0;
+  for (const GpuPassTime& time : times_) all_ms += time.ms;
+  const double waited_ms = 1e-6 * static_cast<double>(now - submitted_ns_);
+  const double scale = all_ms > waited_ms ? waited_ms / all_ms : 1.0;
+  double before_end_ms = scale * all_ms;
+  const auto at = [&] { return now - static_cast<std::int64_t>(1e6 * std::max(before_end_ms, 0.0)); };
+  for (const GpuPassTime& time : times_) {
+    const std::int64_t begin = at();
+    before_end_ms -= scale * time.ms;
+    trace::add_device_span(time.pass, begin, at());
+  }
 }
 
 void GpuBatch::read_times() {

@@ -61,13 +61,15 @@ class GpuBatch {
   void order();
   void stamp();
   void read_times();
+  void trace_times() const;
 
   const GpuDevice& device_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkCommandBuffer commands_ = VK_NULL_HANDLE;
   VkSemaphore semaphore_ = VK_NULL_HANDLE;
   VkQueryPool stamps_ = VK_NULL_HANDLE;
-  std::uint64_t submitted_ = 0;  ///< the semaphore's value once all is done
+  std::uint64_t submitted_ = 0;    ///< the semaphore's value once all is done
+  std::int64_t submitted_ns_ = 0;  ///< of the clock that traces are timed by
   bool recording_ = false;
   bool in_flight_ = false;
   bool is_late_ = false;  ///< was waited for in vain
