@@ -143,7 +143,7 @@ void Session::compare_devices() {
   const auto by_cpu = all_gather_value(comm_, device.software ? 1 : 0);
   const std::vector<std::string> devices = all_gather_texts(comm_, device.name + ", " + device.driver);
   for (std::size_t rank = 0; rank < hosts.size(); ++rank) used.push_back({hosts[rank], uuids[rank], by_cpu[rank] != 0});
-  const std::size_t self = static_cast<std::size_t>(comm_.rank());
+  const auto self = static_cast<std::size_t>(comm_.rank());
   const auto together = std::ranges::count_if(
       used, [&](const DeviceOfRank& each) { return each.host == used[self].host && each.uuid == used[self].uuid; });
   device_bytes_ = std::ranges::min(all_gather_value(comm_, device.memory / static_cast<std::uint64_t>(together)));
@@ -190,7 +190,7 @@ bool Session::has_gpu_of_keys() const {
 
 std::string Session::refusal_of_light(const RaySettings& settings) const {
   if (!gpu_) return "no device was asked for";
-  if (const std::string refusal = refusal_of_scene(); !refusal.empty()) return refusal;
+  if (std::string refusal = refusal_of_scene(); !refusal.empty()) return refusal;
   return hpr::refusal_of_light(scene_, settings, plan_passes(requirements_, settings));
 }
 
