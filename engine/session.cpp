@@ -194,9 +194,13 @@ std::string Session::refusal_of_light(const RaySettings& settings) const {
   return hpr::refusal_of_light(scene_, settings, plan_passes(requirements_, settings));
 }
 
+std::string Session::device_and_driver() const {
+  return gpu_ ? fmt::format("{}, driver {}", gpu_->info().name, gpu_->info().driver) : "";
+}
+
 std::string Session::device_description() const {
   if (!gpu_) return no_device_.empty() ? "" : fmt::format("none ({})", no_device_);
-  return fmt::format("{}, driver {} ({})", gpu_->info().name, gpu_->info().driver,
+  return fmt::format("{} ({})", device_and_driver(),
                      settings_.backend == kVulkan ? "as asked by --backend vulkan" : "a GPU that Vulkan has");
 }
 

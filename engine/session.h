@@ -110,7 +110,9 @@ class Session {
   [[nodiscard]] GpuPrimaryRays& gpu_primary_rays(std::span<const SurfaceRange> objects);
   /// Whether there is a device that keys and light may be made by.
   [[nodiscard]] bool has_device() const { return gpu_ != nullptr; }
-  /// That device, its driver, and why it is used; where GPUs are not used though there are some, why: "none (...)".
+  /// Names of that device and its driver; empty: there is none.
+  [[nodiscard]] std::string device_and_driver() const;
+  /// Both, and why it is used; where GPUs are not used though there are some, why: "none (...)".
   /// Else empty.
   [[nodiscard]] std::string device_description() const;
   /// Why no device lights by these settings; empty: one does (shader()).

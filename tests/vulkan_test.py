@@ -132,6 +132,18 @@ def target_time(folder):
         expect((lit.get("device direct", 0) > 0) == by_device, f"{settings}: the last frame's light: {lit}")
 
 
+def resumed(folder):
+    """Samples of a device and of the CPU do not mix, whoever chose the device."""
+    settings = ("render", "gen:cornell", "--size", "32x24", "--quality", "draft", "--spp", "2", "-o", "r.exr", "--checkpoint", "r.hpr")
+    hpr(folder, *settings, "--backend", "vulkan")
+    said = hpr(folder, *settings, "--resume", code=2)
+    expect("device" in said.stderr, f"resumed without the device: {said.stderr[-600:]}")
+    hpr(folder, *settings, "--resume", "--backend", "vulkan")
+    hpr(folder, *settings[:-2], "--checkpoint", "c.hpr", "--force")
+    said = hpr(folder, *settings[:-2], "--checkpoint", "c.hpr", "--resume", "--backend", "vulkan", code=2)
+    expect("device" in said.stderr, f"resumed with a device: {said.stderr[-600:]}")
+
+
 def said_and_done(folder):
     said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "-o", "b.png", "--backend", "vulkan", "--explain")
     words = said.stdout + said.stderr
@@ -176,6 +188,7 @@ def main():
         left_open(folder)
         device_row(folder)
         target_time(folder)
+        resumed(folder)
         said_and_done(folder)
     return 1 if failures else 0
 

@@ -286,7 +286,7 @@ RunIdentity identity_of(const Session& session, const FramePlan& plan, std::span
   identity.emplace_back("number of photons", fmt::format("{}", plan.rays.photons));
   identity.emplace_back(kKeys, plan.primary == Primary::Rays ? kByRays : kByRaster);
   const bool uses_device = plan.keys_on_device || plan.rays.on_device;
-  identity.emplace_back(kDevice, uses_device ? session.device_description() : kNoDevice);
+  identity.emplace_back(kDevice, uses_device ? session.device_and_driver() : kNoDevice);
   for (const Setting& setting : all_settings()) {
     if (setting.decides_bits) {
       identity.emplace_back(fmt::format("--{}", setting.name), fmt::format("'{}'", setting.value.write(settings)));
