@@ -23,6 +23,7 @@
 #include "engine/binning/chunk_binning.h"
 #include "engine/display/background.h"
 #include "engine/session.h"
+#include "gpu/light/gpu_photon_tracer.h"
 #include "rt/passes/pass_list.h"
 #include "rt/sampling/sampler.h"
 #include "rt/sampling/sampling.h"
@@ -380,6 +381,10 @@ void choose_light(const Session& session, const FrameSettings& settings, FramePl
       settings.light_by_device ? refusal_of_light(session, plan, views) : "as what was lit before";
   plan.rays.on_device = refusal.empty();
   plan.explained.push_back(refusal.empty() ? "light: on the device" : fmt::format("light: by the CPU ({})", refusal));
+  if (!refusal.empty() || !runs_pass(plan_passes(session.requirements(), plan.rays), PassId::Photon)) return;
+  const std::string untraced = refusal_of_photons(session.scene());
+  plan.explained.push_back(untraced.empty() ? "photons: traced on the device"
+                                            : fmt::format("photons: traced by the CPU ({})", untraced));
 }
 
 void explain_pass(const PassPlan& pass, const FrameSettings& settings, FramePlan& plan) {

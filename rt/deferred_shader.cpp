@@ -76,6 +76,7 @@ DeferredShader::State::State(const Scene& lit, RaySettings chosen, const Require
   if (needs_photons(plan)) build_photons();
   if (settings.reference) build_reference();
   if (make_device) device = make_device({scene, surfaces, lights, settings, plan, followed_lobes});
+  if (device && photons) photons->trace_on(device->photon_device());
 }
 
 /// Builds the ray scene of this rank's part of `objects`.
@@ -427,6 +428,7 @@ void DeferredShader::State::gather_counts(double spent_ms) {
     const PassInfo& info = passes[i].info;
     if (info.needs_photons) spent += std::exchange(photon_ms, 0.0) * settings.threads;
     times.push_back({std::string(info.name), spent, info.id});
+    if (info.needs_photons && device) add_photon_times(*device, settings.threads, times);
   }
   if (settings.denoise) times.push_back({"denoise", ms.back()});
 }

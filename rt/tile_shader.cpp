@@ -6,6 +6,7 @@
 #include "core/timing.h"
 #include "rt/passes/path_vertex.h"
 #include "rt/passes/pixel_sums.h"
+#include "rt/photons/photon_tracer.h"
 
 namespace hpr {
 
@@ -33,6 +34,16 @@ std::vector<std::size_t> shade_on_device(TileShader& device, const TilesToShade&
     store_shaded(job, tile, pixels, sample.output, traced);
   });
   return {unfinished.begin(), unfinished.end()};
+}
+
+void add_photon_times(TileShader& device, int threads, std::vector<PassTime>& times) {
+  PhotonDevice* const traces = device.photon_device();
+  if (traces == nullptr) return;
+  const std::size_t pass = times.size() - 1;
+  for (const PassTime& step : traces->take_times()) {
+    times.push_back({step.name, step.ms * threads});
+    times[pass].ms = std::max(times[pass].ms - times.back().ms, 0.0);
+  }
 }
 
 void add_times(const TileShader& device, double ms, int threads, std::vector<PassTime>& times) {

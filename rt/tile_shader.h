@@ -24,6 +24,7 @@
 
 namespace hpr {
 
+class PhotonDevice;
 struct PhotonMaps;
 
 /// What light is computed from, on whatever device: a scene, its tables, and what is to be done. As long as the shader
@@ -96,6 +97,9 @@ class TileShader {
   /// Lights points, for who filters the light.
   virtual void shade_points(const PointsToShade& lit, RayCounts& counts) = 0;
 
+  /// What traces photons in the CPU's stead; null where that is to be the CPU.
+  [[nodiscard]] virtual PhotonDevice* photon_device() { return nullptr; }
+
   /// How long the device was at its steps since clear_times(); the same steps on all ranks, whatever they lit.
   [[nodiscard]] virtual std::span<const PassTime> times() const = 0;
   virtual void clear_times() = 0;
@@ -106,6 +110,9 @@ class TileShader {
 
 /// Lights what the device can and adds the rays it traced. Returns the tiles that are left to the CPU, of all samples.
 [[nodiscard]] std::vector<std::size_t> shade_on_device(TileShader& device, const TilesToShade& lit, RayCounts& traced);
+
+/// Splits the last of `times`, which took in the tracing of photons, into the device's steps of that and the rest.
+void add_photon_times(TileShader& device, int threads, std::vector<PassTime>& times);
 
 /// Adds the steps of the device, of which everything took so many ms: those of threads, all together.
 void add_times(const TileShader& device, double ms, int threads, std::vector<PassTime>& times);

@@ -192,6 +192,10 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
   state_bytes_ = array_stride(layout, "PixelState");
   waiting_bytes_ = kMaxWaiting * array_stride(layout, "FoundVertex");
   compile();
+  if (runs_pass(inputs.plan, PassId::Photon) && refusal_of_photons(inputs.scene).empty()) {
+    const GpuPhotonInputs traced{scene_.address(), surfaces_.address(), materials_.address(), lights_.address()};
+    photon_tracer_ = std::make_unique<GpuPhotonTracer>(device, traced, extended);
+  }
 }
 
 /// Software devices compile a kernel when it runs first, which takes seconds: each for itself, as waits have a limit.

@@ -16,6 +16,7 @@
 #include "gpu/gpu_scene.h"
 #include "gpu/light/gpu_lights.h"
 #include "gpu/light/gpu_materials.h"
+#include "gpu/light/gpu_photon_tracer.h"
 #include "gpu/light/gpu_photons.h"
 #include "gpu/light/gpu_surfaces.h"
 #include "rt/tile_shader.h"
@@ -34,6 +35,7 @@ class GpuTileShader final : public TileShader {
 
   void shade(const TilesToShade& lit, RayCounts& counts, const Store& store) override;
   void shade_points(const PointsToShade& lit, RayCounts& counts) override;
+  [[nodiscard]] PhotonDevice* photon_device() override { return photon_tracer_.get(); }
   [[nodiscard]] std::span<const PassTime> times() const override { return times_; }
   void clear_times() override;
 
@@ -78,6 +80,7 @@ class GpuTileShader final : public TileShader {
   std::optional<GpuBuffer> points_;
   std::optional<GpuBuffer> point_lights_;
   std::optional<GpuBuffer> read_lights_;
+  std::unique_ptr<GpuPhotonTracer> photon_tracer_;  ///< null where the CPU traces photons, or nobody
   GpuBatch batch_;
 };
 

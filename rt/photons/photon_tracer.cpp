@@ -91,14 +91,9 @@ struct PhotonTracer::Flight {
 
 /// Photons under way together and what they left.
 struct PhotonTracer::Block {
-  struct Kept {
-    std::uint32_t photon;
-    bool caustic;
-    Photon stored;
-  };
   std::vector<Flight> flights;
   std::vector<Flight> next;
-  std::vector<Kept> kept;
+  std::vector<KeptPhoton> kept;
   RayBatch batch;
   std::vector<std::uint32_t> hits;
   std::vector<Passed> met;  ///< by the same flights
@@ -107,8 +102,13 @@ struct PhotonTracer::Block {
 
   /// From the order of generations into that of photons; each one's bounces keep their order.
   void sort() {
-    std::ranges::stable_sort(kept, {}, &Kept::photon);
-    for (const Kept& one : kept) (one.caustic ? traced.caustic : traced.global).push_back(one.stored);
+    std::ranges::stable_sort(kept, {}, &KeptPhoton::photon);
+    store(kept, traced);
+  }
+
+  /// Those of both kinds in their order.
+  static void store(const std::vector<KeptPhoton>& kept, TracedPhotons& traced) {
+    for (const KeptPhoton& one : kept) (one.caustic ? traced.caustic : traced.global).push_back(one.stored);
     traced.counts.caustic = traced.caustic.size();
     traced.counts.global = traced.global.size();
   }
@@ -138,29 +138,60 @@ class KeptPhotons {
 TracedPhotons PhotonTracer::trace(const RandomKey& key, const PhotonRange& range, std::uint64_t pass_photons,
                                   const std::function<bool()>& is_overtaken) const {
   const std::uint64_t stream = photon_stream(key);
+  const double fraction = 1.0 / static_cast<double>(pass_photons);
+  if (device_ != nullptr) return trace_on_device({stream, range, fraction, settings_, is_overtaken});
   const std::uint64_t count = (range.count + kBlockPhotons - 1) / kBlockPhotons;
   std::vector<TracedPhotons> traced(count);
   KeptPhotons kept(settings_.max_kept);
-  const auto trace_block = [&](std::size_t i) {
+  const auto trace_one = [&](std::size_t i) {
     if (is_overtaken && is_overtaken()) return;
-    const DenormalsAsZero mode;
     Block block;
     const std::uint64_t before = i * kBlockPhotons;
-    start(stream, {range.first + before, std::min(kBlockPhotons, range.count - before)},
-          1.0 / static_cast<double>(pass_photons), block);
-    block.batch.purpose = {RayKind::Photon};
-    for (; !block.flights.empty(); ++block.batch.purpose.generation) move(block);
+    trace_block(stream, {range.first + before, std::min(kBlockPhotons, range.count - before)}, fraction, block);
     block.sort();
     kept.add(block.traced.caustic.size() + block.traced.global.size());
     traced[i] = std::move(block.traced);
   };
-  rays_.for_each(settings_.threads, count, trace_block, CallMemory::Small);
+  rays_.for_each(settings_.threads, count, trace_one, CallMemory::Small);
   TracedPhotons all;
   for (const TracedPhotons& part : traced) {
     append(all.caustic, part.caustic);
     append(all.global, part.global);
     all.counts += part.counts;
   }
+  return all;
+}
+
+void PhotonTracer::trace_block(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const {
+  const DenormalsAsZero mode;
+  start(stream, range, fraction, block);
+  block.batch.purpose = {RayKind::Photon};
+  for (; !block.flights.empty(); ++block.batch.purpose.generation) move(block);
+}
+
+/// What the device leaves out is traced photon by photon.
+TracedPhotons PhotonTracer::trace_on_device(const PhotonsToTrace& wanted) const {
+  KeptPhotons kept(settings_.max_kept);
+  DevicePhotons found;
+  device_->trace(wanted, found);
+  kept.add(found.kept.size());
+  std::vector<Block> rest(found.unfinished.size());
+  rays_.for_each(
+      settings_.threads, rest.size(),
+      [&](std::size_t i) {
+        trace_block(wanted.stream, {wanted.range.first + found.unfinished[i], 1}, wanted.fraction, rest[i]);
+        for (KeptPhoton& one : rest[i].kept) one.photon = found.unfinished[i];
+        kept.add(rest[i].kept.size());
+      },
+      CallMemory::Small);
+  TracedPhotons all;
+  all.counts = found.counts;
+  for (const Block& block : rest) {
+    append(found.kept, block.kept);
+    all.counts += block.traced.counts;
+  }
+  if (!rest.empty()) std::ranges::stable_sort(found.kept, {}, &KeptPhoton::photon);
+  Block::store(found.kept, all);
   return all;
 }
 

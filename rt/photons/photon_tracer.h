@@ -14,6 +14,7 @@
 #include "rt/materials/bsdf.h"
 #include "rt/photons/adjoint_bsdf.h"
 #include "rt/photons/photon_map.h"
+#include "rt/ray_counts.h"
 #include "rt/sampling/sampler.h"
 #include "rt/trace/ray_scene.h"
 #include "rt/trace/surfaces.h"
@@ -65,6 +66,44 @@ struct PhotonRange {
 using PhotonSource = std::function<std::optional<PhotonStart>(double u_choice, const glm::dvec2& u_place,
                                                               const glm::dvec2& u_direction)>;
 
+/// A photon of a range that was kept.
+struct KeptPhoton {
+  std::uint32_t photon = 0;  ///< of the range, from 0
+  bool caustic = false;      ///< see TracedPhotons
+  Photon stored;
+};
+
+/// Photons that a device is to trace.
+struct PhotonsToTrace {
+  std::uint64_t stream = 0;  ///< photon_stream()
+  PhotonRange range;
+  double fraction = 1.0;  ///< of its light's flux that each carries
+  const PhotonSettings& settings;
+  const std::function<bool()>& is_overtaken;  ///< asked now and then: the rest means nothing then; may be empty
+};
+
+/// What a device made of them.
+struct DevicePhotons {
+  std::vector<KeptPhoton> kept;           ///< by photon, then by bounce
+  PhotonCounts counts;                    ///< but for the photons kept
+  std::vector<std::uint32_t> unfinished;  ///< photons of the range, in order, that the CPU is to trace: nothing of them
+                                          ///< is in the rest
+};
+
+/// Traces photons in the CPU's stead, by the steps and random numbers of PhotonTracer.
+class PhotonDevice {
+ public:
+  PhotonDevice() = default;
+  virtual ~PhotonDevice() = default;
+  PhotonDevice(const PhotonDevice&) = delete;
+  PhotonDevice& operator=(const PhotonDevice&) = delete;
+
+  /// Adds to `traced`.
+  virtual void trace(const PhotonsToTrace& wanted, DevicePhotons& traced) = 0;
+  /// How long the device was at its steps since the last call: always the same steps.
+  [[nodiscard]] virtual std::vector<PassTime> take_times() = 0;
+};
+
 /// Traces photons through the scene and stores them where paths from the eye will query them: at every arrival on a
 /// surface with a lobe that those do not follow, except straight from the light (Jensen, "Global Illumination using
 /// Photon Maps", 1996, with the partition of photon_query.h). Light that passes a surface of partial coverage still
@@ -88,6 +127,8 @@ class PhotonTracer {
   /// Settings of the next trace().
   void set_flux_unit(double watts) { settings_.flux_unit = watts; }
   void set_max_kept(std::uint64_t photons) { settings_.max_kept = photons; }
+  /// From here on `device`, which must outlive this, traces what it can; null: nothing.
+  void trace_on(PhotonDevice* device) { device_ = device; }
 
   /// Traces the photons of `range`, one of which carries 1 / `pass_photons` of the light's flux. Successive passes
   /// take successive ranges: the photons of all passes together are spread evenly. Throws Error (Limit) where more are
@@ -99,6 +140,8 @@ class PhotonTracer {
   struct Flight;
   struct Block;
 
+  [[nodiscard]] TracedPhotons trace_on_device(const PhotonsToTrace& wanted) const;
+  void trace_block(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const;
   void start(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const;
   void move(Block& block) const;
   [[nodiscard]] bool arrive(Flight& flight, const SurfacePoint& surface, const Passed& met, Block& block) const;
@@ -113,6 +156,7 @@ class PhotonTracer {
   PhotonSource source_;
   PhotonSettings settings_;
   bool has_coverage_;
+  PhotonDevice* device_ = nullptr;
 };
 
 /// Collective: every rank's photons on every rank, in order of rank. The counts stay this rank's own.
@@ -144,6 +188,9 @@ class PhotonMapBuilder {
   /// traced: then the maps are made anew when next asked for. Ranks agree every tenth of a second or so.
   [[nodiscard]] bool build_while_wanted(const SampleNumber& number, Communicator& comm,
                                         const std::function<bool()>& is_overtaken);
+
+  /// See PhotonTracer.
+  void trace_on(PhotonDevice* device) { tracer_.trace_on(device); }
 
   /// The next maps are made anew, with the radii of before.
   void discard() { built_.reset(); }

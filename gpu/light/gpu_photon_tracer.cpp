@@ -1,0 +1,265 @@
+#include "gpu/light/gpu_photon_tracer.h"
+
+#include <hpr/shaders/photon_arrive.h>
+#include <hpr/shaders/photon_arrive_plain.h>
+#include <hpr/shaders/photon_directions.h>
+#include <hpr/shaders/photon_directions_plain.h>
+#include <hpr/shaders/photon_scatter.h>
+#include <hpr/shaders/photon_scatter_plain.h>
+#include <hpr/shaders/photon_start.h>
+#include <hpr/shaders/photon_start_plain.h>
+#include <hpr/shaders/photon_trace.h>
+#include <hpr/shaders/photon_trace_plain.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <string_view>
+#include <utility>
+
+#include "core/job_board.h"
+#include "scene/requirements.h"
+
+namespace hpr {
+namespace {
+
+/// As in photon_state.glsl.
+struct GpuPhotonInput {
+  GpuPhotonInputs tables;
+  std::uint64_t states = 0;
+  std::uint64_t flights = 0;
+  std::uint64_t live = 0;
+  std::uint64_t kept = 0;
+  std::uint64_t statuses = 0;
+  std::uint64_t stream = 0;
+  std::uint64_t first = 0;
+  double fraction = 1.0;
+  double glossy_cutoff = 0.0;
+  double flux_unit = 1.0;
+  std::uint32_t max_bounces = 0;
+  std::uint32_t max_flights = 0;
+  std::uint32_t caustics_only = 0;
+  std::uint32_t padding = 0;
+};
+static_assert(sizeof(GpuPhotonInput) == 128);
+
+struct GpuPhotonStatus {
+  std::uint32_t waiting = 0;
+  std::uint32_t rays = 0;
+  std::uint32_t sent = 0;
+  std::uint32_t lost = 0;
+  std::uint32_t is_cut_off = 0;
+};
+
+struct GpuKeptPhoton {
+  Photon stored;
+  std::uint32_t kind = 0;
+};
+static_assert(sizeof(GpuKeptPhoton) == 40);
+constexpr std::uint32_t kNotKept = 0;
+constexpr std::uint32_t kKeptCaustic = 1;
+
+struct Constants {
+  std::uint64_t input;
+  std::uint32_t live_count;
+  std::uint32_t round;
+};
+
+/// Traced at once: a batch has a time limit, and each photon has kilobytes of memory while it is traced.
+constexpr std::size_t kSoftwarePhotons = 8192;
+constexpr std::size_t kDevicePhotons = 65536;
+/// Of a photon that are under way together: more are rare, as smooth surfaces seldom make many of one.
+constexpr std::uint32_t kMaxFlights = 8;
+/// Surfaces that each photon may meet before the CPU looks.
+constexpr std::size_t kMaxRounds = 8;
+/// Of the photons traced at once: surfaces they may meet before the CPU looks, while all are under way.
+constexpr std::size_t kFirstRounds = 2;
+
+/// The steps of photons; those from the second on are repeated.
+enum Step : std::size_t { Start, Trace, Arrive, Directions, Scatter };
+
+struct StepInfo {
+  std::string_view name;
+  std::span<const std::uint32_t> shader;
+  std::span<const std::uint32_t> plain_shader;  ///< for scenes without extensions of materials
+};
+
+/// By step.
+std::array<StepInfo, 5> steps() {
+  return {{{"device photon start", photon_start, photon_start_plain},
+           {"device photon trace", photon_trace, photon_trace_plain},
+           {"device photon arrive", photon_arrive, photon_arrive_plain},
+           {"device photon directions", photon_directions, photon_directions_plain},
+           {"device photon scatter", photon_scatter, photon_scatter_plain}}};
+}
+
+}  // namespace
+
+std::string refusal_of_photons(const Scene& scene) {
+  return has_coverage(scene) ? "photons that pass surfaces of partial coverage are the CPU's" : "";
+}
+
+/// Photons that are traced at once.
+struct GpuPhotonTracer::Piece {
+  std::vector<std::uint32_t> live;          ///< those still under way
+  std::vector<KeptPhoton> kept;             ///< in the order they were read; by photon in the end
+  std::vector<std::uint32_t> unfinished;    ///< photons that the CPU is to trace
+  std::vector<std::uint8_t> is_unfinished;  ///< by photon
+  PhotonCounts counts;
+
+  /// By photon, each one's bounces in their order, without those that are not finished.
+  void sort();
+};
+
+void GpuPhotonTracer::Piece::sort() {
+  std::ranges::sort(unfinished);
+  std::vector<std::size_t> starts(is_unfinished.size() + 1, 0);
+  for (const KeptPhoton& one : kept) ++starts[one.photon + 1];
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<KeptPhoton> sorted(kept.size());
+  for (const KeptPhoton& one : kept) sorted[starts[one.photon]++] = one;
+  std::erase_if(sorted, [&](const KeptPhoton& one) { return is_unfinished[one.photon] != 0; });
+  kept = std::move(sorted);
+}
+
+GpuPhotonTracer::GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs& inputs, bool extended)
+    : device_(device),
+      inputs_(inputs),
+      photons_(device.info().software ? kSoftwarePhotons : kDevicePhotons),
+      input_(device, sizeof(GpuPhotonInput), GpuMemory::Upload),
+      batch_(device) {
+  for (const StepInfo& step : steps()) {
+    const auto shader = extended ? step.shader : step.plain_shader;
+    kernels_.push_back(std::make_unique<GpuKernel>(device, shader, sizeof(Constants)));
+    times_.push_back({std::string(step.name), 0.0});
+  }
+  const auto layout = extended ? steps()[Scatter].shader : steps()[Scatter].plain_shader;
+  state_bytes_ = array_stride(layout, "PhotonState");
+  flight_bytes_ = array_stride(layout, "PhotonFlight");
+  compile();
+}
+
+/// Software devices compile a kernel when it runs first, which takes seconds: each for itself, as waits have a limit.
+void GpuPhotonTracer::compile() {
+  if (!device_.info().software) return;
+  for (const auto& kernel : kernels_) {
+    batch_.run(*kernel, 1, Constants{input_.address(), 0, 0});
+    batch_.submit();
+    batch_.wait();
+  }
+}
+
+std::vector<PassTime> GpuPhotonTracer::take_times() {
+  std::vector<PassTime> times = times_;
+  for (PassTime& step : times_) step.ms = 0.0;
+  return times;
+}
+
+void GpuPhotonTracer::run_step(std::size_t step, std::size_t threads, std::uint32_t round) {
+  batch_.begin_pass(times_[step].name);
+  batch_.run(*kernels_[step], threads, Constants{input_.address(), static_cast<std::uint32_t>(threads), round});
+}
+
+void GpuPhotonTracer::finish_batch() {
+  batch_.submit();
+  batch_.wait();
+  report_step();
+  for (const GpuPassTime& time : batch_.times()) {
+    const auto step = std::ranges::find(times_, time.pass, &PassTime::name);
+    if (step != times_.end()) step->ms += time.ms;
+  }
+}
+
+void GpuPhotonTracer::grow() {
+  if (states_) return;
+  const std::size_t kept_bytes = kFirstRounds * photons_ * sizeof(GpuKeptPhoton);
+  flights_.emplace(device_, photons_ * kMaxFlights * flight_bytes_, GpuMemory::Device);
+  live_.emplace(device_, photons_ * sizeof(std::uint32_t), GpuMemory::Upload);
+  kept_.emplace(device_, kept_bytes, GpuMemory::Device);
+  read_.emplace(device_, kept_bytes, GpuMemory::Readback);
+  statuses_.emplace(device_, photons_ * sizeof(GpuPhotonStatus), GpuMemory::Readback);
+  states_.emplace(device_, photons_ * state_bytes_, GpuMemory::Device);
+}
+
+void GpuPhotonTracer::write_input(const PhotonsToTrace& wanted, std::uint64_t first) {
+  input_.mapped<GpuPhotonInput>()[0] = {.tables = inputs_,
+                                        .states = states_->address(),
+                                        .flights = flights_->address(),
+                                        .live = live_->address(),
+                                        .kept = kept_->address(),
+                                        .statuses = statuses_->address(),
+                                        .stream = wanted.stream,
+                                        .first = first,
+                                        .fraction = wanted.fraction,
+                                        .glossy_cutoff = wanted.settings.glossy_cutoff,
+                                        .flux_unit = wanted.settings.flux_unit,
+                                        .max_bounces = static_cast<std::uint32_t>(wanted.settings.max_bounces),
+                                        .max_flights = kMaxFlights,
+                                        .caustics_only = wanted.settings.caustics_only ? 1U : 0U};
+}
+
+/// What the live photons left in so many rounds, and which of them are still under way.
+void GpuPhotonTracer::read_rounds(std::size_t rounds, Piece& piece) const {
+  const std::size_t count = piece.live.size();
+  const std::span<const GpuKeptPhoton> kept = read_->mapped<const GpuKeptPhoton>();
+  const std::span<const GpuPhotonStatus> statuses = statuses_->mapped<const GpuPhotonStatus>();
+  std::vector<std::uint32_t> live;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t photon = piece.live[i];
+    for (std::size_t round = 0; round < rounds; ++round) {
+      const GpuKeptPhoton& one = kept[round * count + i];
+      if (one.kind != kNotKept) piece.kept.push_back({photon, one.kind == kKeptCaustic, one.stored});
+    }
+    const GpuPhotonStatus& status = statuses[i];
+    if (status.is_cut_off != 0) {
+      piece.unfinished.push_back(photon);
+      piece.is_unfinished[photon] = 1;
+    } else if (status.waiting > 0) {
+      live.push_back(photon);
+    } else {
+      piece.counts.sent += status.sent;
+      piece.counts.rays += status.rays;
+      piece.counts.lost += status.lost;
+    }
+  }
+  piece.live = std::move(live);
+}
+
+void GpuPhotonTracer::trace_piece(const PhotonsToTrace& wanted, const PhotonRange& range, Piece& piece) {
+  write_input(wanted, range.first);
+  piece.is_unfinished.assign(range.count, 0);
+  piece.live.resize(range.count);
+  std::iota(piece.live.begin(), piece.live.end(), 0U);
+  for (bool starts = true; !piece.live.empty(); starts = false) {
+    if (wanted.is_overtaken && wanted.is_overtaken()) return;
+    std::ranges::copy(piece.live, live_->mapped<std::uint32_t>().begin());
+    const std::size_t count = piece.live.size();
+    const std::size_t rounds = std::min(kFirstRounds * photons_ / count, kMaxRounds);
+    if (starts) run_step(Start, count, 0);
+    for (std::size_t round = 0; round < rounds; ++round) {
+      for (const Step step : {Trace, Arrive, Directions, Scatter}) {
+        run_step(step, count, static_cast<std::uint32_t>(round));
+      }
+    }
+    batch_.copy(*kept_, *read_, rounds * count * sizeof(GpuKeptPhoton));
+    finish_batch();
+    read_rounds(rounds, piece);
+  }
+  piece.sort();
+}
+
+void GpuPhotonTracer::trace(const PhotonsToTrace& wanted, DevicePhotons& traced) {
+  grow();
+  for (std::uint64_t done = 0; done < wanted.range.count; done += photons_) {
+    Piece piece;
+    trace_piece(wanted, {wanted.range.first + done, std::min<std::uint64_t>(photons_, wanted.range.count - done)},
+                piece);
+    if (wanted.is_overtaken && wanted.is_overtaken()) return;
+    const auto before = static_cast<std::uint32_t>(done);
+    for (const KeptPhoton& one : piece.kept) traced.kept.push_back({one.photon + before, one.caustic, one.stored});
+    for (const std::uint32_t photon : piece.unfinished) traced.unfinished.push_back(photon + before);
+    traced.counts += piece.counts;
+  }
+}
+
+}  // namespace hpr
