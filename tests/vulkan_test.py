@@ -32,9 +32,9 @@ def hpr(folder, *arguments, code=0):
     return result
 
 
-def render(folder, scene, *arguments):
+def render(folder, scene, *arguments, photons="2000"):
     """The bytes of the keys and of the picture."""
-    hpr(folder, "render", scene, "--size", f"{SIZE[0]}x{SIZE[1]}", "--photons", "2000", "--raw", "a.keys", "-o", "a.exr", "--force", *arguments)
+    hpr(folder, "render", scene, "--size", f"{SIZE[0]}x{SIZE[1]}", "--photons", photons, "--raw", "a.keys", "-o", "a.exr", "--force", *arguments)
     return (folder / "a.keys").read_bytes(), (folder / "a.exr").read_bytes()
 
 
@@ -50,8 +50,8 @@ def has_device(folder):
 def keys_of_scenes(folder):
     for scene in SCENES:
         quick = ("--quality", "draft", "--spp", "1")
-        expected = surfaces(render(folder, scene, "--primary", "rays", *quick)[0])
-        found = surfaces(render(folder, scene, "--backend", "vulkan", *quick)[0])
+        expected = surfaces(render(folder, scene, "--primary", "rays", *quick, photons="0")[0])
+        found = surfaces(render(folder, scene, "--backend", "vulkan", *quick, photons="0")[0])
         others = sum(a != b for a, b in zip(found, expected))
         expect(others <= OTHERS * len(found), f"{scene}: {others} of {len(found)} pixels show another surface than Embree's")
         expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
@@ -71,7 +71,10 @@ def light_of_scenes(folder):
             settings = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "draft", "--spp", "1", *kind, "--force")
             hpr(folder, "render", scene, "-o", "cpu.exr", "--primary", "rays", *settings)
             said = hpr(folder, "render", scene, "-o", "gpu.exr", "--backend", "vulkan", "--explain", *settings)
-            expect("light: on the device" in said.stdout + said.stderr, f"{scene}: the CPU lights: {said.stderr[-400:]}")
+            words = said.stdout + said.stderr
+            expect("light: on the device" in words, f"{scene}: the CPU lights: {said.stderr[-400:]}")
+            sends = "pass photon: on" in words
+            expect(("photons: traced on the device" in words) == sends, f"{scene}: does not say who traces photons: {words[-800:]}")
             nearly_equal(folder, "cpu.exr", "gpu.exr", f"{scene} {kind}")
 
 
