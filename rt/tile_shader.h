@@ -98,7 +98,7 @@ class TileShader {
   virtual void shade_points(const PointsToShade& lit, RayCounts& counts) = 0;
 
   /// What traces photons in the CPU's stead; null where that is to be the CPU.
-  [[nodiscard]] virtual PhotonDevice* photon_device() { return nullptr; }
+  [[nodiscard]] virtual PhotonDevice* photon_device() = 0;
 
   /// How long the device was at its steps since clear_times(); the same steps on all ranks, whatever they lit.
   [[nodiscard]] virtual std::span<const PassTime> times() const = 0;

@@ -33,6 +33,7 @@ class CountingShader final : public TileShader {
     });
   }
   void shade_points(const PointsToShade& lit, RayCounts& counts) override { by_.shade_points(lit, counts); }
+  [[nodiscard]] PhotonDevice* photon_device() override { return by_.photon_device(); }
   [[nodiscard]] std::span<const PassTime> times() const override { return by_.times(); }
   void clear_times() override { by_.clear_times(); }
 
