@@ -17,6 +17,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/error.h"
 #include "core/job_board.h"
 #include "scene/requirements.h"
 
@@ -50,6 +51,7 @@ struct GpuPhotonStatus {
   std::uint32_t lost = 0;
   std::uint32_t is_cut_off = 0;
 };
+static_assert(sizeof(GpuPhotonStatus) == 20);
 
 struct GpuKeptPhoton {
   Photon stored;
@@ -99,27 +101,25 @@ std::string refusal_of_photons(const Scene& scene) {
   return has_coverage(scene) ? "photons that pass surfaces of partial coverage are the CPU's" : "";
 }
 
-/// Photons that are traced at once.
+/// Photons while they are traced.
 struct GpuPhotonTracer::Piece {
   std::vector<std::uint32_t> live;          ///< those still under way
-  std::vector<KeptPhoton> kept;             ///< in the order they were read; by photon in the end
-  std::vector<std::uint32_t> unfinished;    ///< photons that the CPU is to trace
   std::vector<std::uint8_t> is_unfinished;  ///< by photon
-  PhotonCounts counts;
+  DevicePhotons left;                       ///< in the order it was read; by photon in the end
 
   /// By photon, each one's bounces in their order, without those that are not finished.
   void sort();
 };
 
 void GpuPhotonTracer::Piece::sort() {
-  std::ranges::sort(unfinished);
+  std::ranges::sort(left.unfinished);
   std::vector<std::size_t> starts(is_unfinished.size() + 1, 0);
-  for (const KeptPhoton& one : kept) ++starts[one.photon + 1];
+  for (const KeptPhoton& one : left.kept) ++starts[one.photon + 1];
   std::partial_sum(starts.begin(), starts.end(), starts.begin());
-  std::vector<KeptPhoton> sorted(kept.size());
-  for (const KeptPhoton& one : kept) sorted[starts[one.photon]++] = one;
+  std::vector<KeptPhoton> sorted(left.kept.size());
+  for (const KeptPhoton& one : left.kept) sorted[starts[one.photon]++] = one;
   std::erase_if(sorted, [&](const KeptPhoton& one) { return is_unfinished[one.photon] != 0; });
-  kept = std::move(sorted);
+  left.kept = std::move(sorted);
 }
 
 GpuPhotonTracer::GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs& inputs, bool extended)
@@ -181,7 +181,7 @@ void GpuPhotonTracer::grow() {
   states_.emplace(device_, photons_ * state_bytes_, GpuMemory::Device);
 }
 
-void GpuPhotonTracer::write_input(const PhotonsToTrace& wanted, std::uint64_t first) {
+void GpuPhotonTracer::write_input(const PhotonsToTrace& wanted) {
   input_.mapped<GpuPhotonInput>()[0] = {.tables = inputs_,
                                         .states = states_->address(),
                                         .flights = flights_->address(),
@@ -189,7 +189,7 @@ void GpuPhotonTracer::write_input(const PhotonsToTrace& wanted, std::uint64_t fi
                                         .kept = kept_->address(),
                                         .statuses = statuses_->address(),
                                         .stream = wanted.stream,
-                                        .first = first,
+                                        .first = wanted.range.first,
                                         .fraction = wanted.fraction,
                                         .glossy_cutoff = wanted.settings.glossy_cutoff,
                                         .flux_unit = wanted.settings.flux_unit,
@@ -208,30 +208,33 @@ void GpuPhotonTracer::read_rounds(std::size_t rounds, Piece& piece) const {
     const std::uint32_t photon = piece.live[i];
     for (std::size_t round = 0; round < rounds; ++round) {
       const GpuKeptPhoton& one = kept[round * count + i];
-      if (one.kind != kNotKept) piece.kept.push_back({photon, one.kind == kKeptCaustic, one.stored});
+      if (one.kind != kNotKept) piece.left.kept.push_back({photon, one.kind == kKeptCaustic, one.stored});
     }
     const GpuPhotonStatus& status = statuses[i];
     if (status.is_cut_off != 0) {
-      piece.unfinished.push_back(photon);
+      piece.left.unfinished.push_back(photon);
       piece.is_unfinished[photon] = 1;
     } else if (status.waiting > 0) {
       live.push_back(photon);
     } else {
-      piece.counts.sent += status.sent;
-      piece.counts.rays += status.rays;
-      piece.counts.lost += status.lost;
+      piece.left.counts.sent += status.sent;
+      piece.left.counts.rays += status.rays;
+      piece.left.counts.lost += status.lost;
     }
   }
   piece.live = std::move(live);
 }
 
-void GpuPhotonTracer::trace_piece(const PhotonsToTrace& wanted, const PhotonRange& range, Piece& piece) {
-  write_input(wanted, range.first);
-  piece.is_unfinished.assign(range.count, 0);
-  piece.live.resize(range.count);
+DevicePhotons GpuPhotonTracer::trace(const PhotonsToTrace& wanted) {
+  HPR_CHECK(wanted.range.count <= photons_);
+  grow();
+  write_input(wanted);
+  Piece piece;
+  piece.is_unfinished.assign(wanted.range.count, 0);
+  piece.live.resize(wanted.range.count);
   std::iota(piece.live.begin(), piece.live.end(), 0U);
   for (bool starts = true; !piece.live.empty(); starts = false) {
-    if (wanted.is_overtaken && wanted.is_overtaken()) return;
+    if (wanted.is_overtaken && wanted.is_overtaken()) break;
     std::ranges::copy(piece.live, live_->mapped<std::uint32_t>().begin());
     const std::size_t count = piece.live.size();
     const std::size_t rounds = std::min(kFirstRounds * photons_ / count, kMaxRounds);
@@ -246,20 +249,7 @@ void GpuPhotonTracer::trace_piece(const PhotonsToTrace& wanted, const PhotonRang
     read_rounds(rounds, piece);
   }
   piece.sort();
-}
-
-void GpuPhotonTracer::trace(const PhotonsToTrace& wanted, DevicePhotons& traced) {
-  grow();
-  for (std::uint64_t done = 0; done < wanted.range.count; done += photons_) {
-    Piece piece;
-    trace_piece(wanted, {wanted.range.first + done, std::min<std::uint64_t>(photons_, wanted.range.count - done)},
-                piece);
-    if (wanted.is_overtaken && wanted.is_overtaken()) return;
-    const auto before = static_cast<std::uint32_t>(done);
-    for (const KeptPhoton& one : piece.kept) traced.kept.push_back({one.photon + before, one.caustic, one.stored});
-    for (const std::uint32_t photon : piece.unfinished) traced.unfinished.push_back(photon + before);
-    traced.counts += piece.counts;
-  }
+  return std::move(piece.left);
 }
 
 }  // namespace hpr

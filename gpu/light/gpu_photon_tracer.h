@@ -34,7 +34,8 @@ class GpuPhotonTracer final : public PhotonDevice {
   /// What `inputs` point to must outlive this, and so must the device. `extended`: some material has extensions.
   GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs& inputs, bool extended);
 
-  void trace(const PhotonsToTrace& wanted, DevicePhotons& traced) override;
+  [[nodiscard]] std::uint64_t max_photons() const override { return photons_; }
+  [[nodiscard]] DevicePhotons trace(const PhotonsToTrace& wanted) override;
   [[nodiscard]] std::vector<PassTime> take_times() override;
 
  private:
@@ -44,8 +45,7 @@ class GpuPhotonTracer final : public PhotonDevice {
   void run_step(std::size_t step, std::size_t threads, std::uint32_t round);
   void finish_batch();
   void grow();
-  void write_input(const PhotonsToTrace& wanted, std::uint64_t first);
-  void trace_piece(const PhotonsToTrace& wanted, const PhotonRange& range, Piece& piece);
+  void write_input(const PhotonsToTrace& wanted);
   void read_rounds(std::size_t rounds, Piece& piece) const;
 
   const GpuDevice& device_;

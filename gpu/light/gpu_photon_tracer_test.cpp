@@ -92,13 +92,26 @@ void compare(const TracedPhotons& cpu, std::span<const KeptPhoton> gpu, Agreemen
   found.elsewhere += alike == expected && gpu.size() == expected ? 0U : 1U;
 }
 
+/// What the device leaves of photons, as many at once as it takes.
+DevicePhotons trace_on_device(GpuPhotonTracer& device, const PhotonSettings& settings, const PhotonRange& range) {
+  DevicePhotons all;
+  for (std::uint64_t done = 0; done < range.count; done += device.max_photons()) {
+    const PhotonRange some{range.first + done, std::min(device.max_photons(), range.count - done)};
+    const DevicePhotons found =
+        device.trace({photon_stream({}), some, 1.0 / static_cast<double>(range.count), settings, {}});
+    const auto before = static_cast<std::uint32_t>(done);
+    for (const KeptPhoton& one : found.kept) all.kept.push_back({one.photon + before, one.caustic, one.stored});
+    for (const std::uint32_t photon : found.unfinished) all.unfinished.push_back(photon + before);
+    all.counts += found.counts;
+  }
+  return all;
+}
+
 Agreement compare(Traced& room, PhotonSettings settings, std::uint64_t first, std::uint64_t photons) {
   const PhotonTracer cpu = room.on_cpu(settings);
   std::vector<TracedPhotons> expected(photons);
   parallel_for(2, photons, [&](std::size_t i) { expected[i] = cpu.trace({}, {first + i, 1}, photons); });
-  DevicePhotons found;
-  room.tracer_there.trace({photon_stream({}), {first, photons}, 1.0 / static_cast<double>(photons), settings, {}},
-                          found);
+  const DevicePhotons found = trace_on_device(room.tracer_there, settings, {first, photons});
   Agreement agreement;
   agreement.photons = photons;
   agreement.unfinished = found.unfinished.size();
@@ -238,6 +251,23 @@ TEST_F(GpuPhotonTracerTest, LeavesToTheCpuWhatItCannotFinish) {
   PhotonTracer few = room.on_cpu({.max_kept = expected.global.size() / 2});
   few.trace_on(&room.tracer_there);
   EXPECT_THROW((void)few.trace({}, {0, 3'000}, 3'000), Error);
+}
+
+TEST_F(GpuPhotonTracerTest, ScenesWithoutLightAndLightWithoutASceneAreFine) {
+  Scene unlit;
+  test::add_room(unlit, test::add_material(unlit, test::diffuse()));
+  Traced dark(device(), std::move(unlit), false);
+  DevicePhotons left = trace_on_device(dark.tracer_there, {}, {0, 100});
+  EXPECT_TRUE(left.kept.empty() && left.unfinished.empty());
+  EXPECT_EQ(left.counts, PhotonCounts{});
+  Light lamp;
+  lamp.intensity = glm::vec3(1.0F);
+  Scene empty;
+  empty.lights = {lamp};
+  Traced lit(device(), std::move(empty), false);
+  left = trace_on_device(lit.tracer_there, {}, {0, 100});
+  EXPECT_TRUE(left.kept.empty() && left.unfinished.empty());
+  EXPECT_EQ(left.counts.sent, 100U);
 }
 
 TEST(GpuPhotonRefusals, AreSaid) {

@@ -32,8 +32,8 @@ struct FluxArrival {
 // Of a lobe of one direction.
 const uint kMaxDirections = 8u;
 struct FluxDirections {
-  dvec3 direction[8];
-  dvec3 weight[8];
+  dvec3 direction[kMaxDirections];
+  dvec3 weight[kMaxDirections];
   dvec3 sum;
   uint count;
 };

@@ -169,30 +169,40 @@ void PhotonTracer::trace_block(std::uint64_t stream, const PhotonRange& range, d
   for (; !block.flights.empty(); ++block.batch.purpose.generation) move(block);
 }
 
-/// What the device leaves out is traced photon by photon.
+/// As many at once as the device takes: what they leave is counted before more are traced.
 TracedPhotons PhotonTracer::trace_on_device(const PhotonsToTrace& wanted) const {
   KeptPhotons kept(settings_.max_kept);
-  DevicePhotons found;
-  device_->trace(wanted, found);
-  kept.add(found.kept.size());
-  std::vector<Block> rest(found.unfinished.size());
-  rays_.for_each(
-      settings_.threads, rest.size(),
-      [&](std::size_t i) {
-        trace_block(wanted.stream, {wanted.range.first + found.unfinished[i], 1}, wanted.fraction, rest[i]);
-        for (KeptPhoton& one : rest[i].kept) one.photon = found.unfinished[i];
-        kept.add(rest[i].kept.size());
-      },
-      CallMemory::Small);
   TracedPhotons all;
-  all.counts = found.counts;
-  for (const Block& block : rest) {
-    append(found.kept, block.kept);
-    all.counts += block.traced.counts;
+  PhotonsToTrace some = wanted;
+  for (std::uint64_t done = 0; done < wanted.range.count; done += some.range.count) {
+    if (wanted.is_overtaken && wanted.is_overtaken()) break;
+    some.range = {wanted.range.first + done, std::min(device_->max_photons(), wanted.range.count - done)};
+    DevicePhotons found = device_->trace(some);
+    finish(some, found);
+    kept.add(found.kept.size());
+    all.counts += found.counts;
+    Block::store(found.kept, all);
   }
-  if (!rest.empty()) std::ranges::stable_sort(found.kept, {}, &KeptPhoton::photon);
-  Block::store(found.kept, all);
   return all;
+}
+
+/// What the device left out is traced photon by photon.
+void PhotonTracer::finish(const PhotonsToTrace& wanted, DevicePhotons& found) const {
+  if (found.unfinished.empty()) return;
+  std::vector<DevicePhotons> rest(found.unfinished.size());
+  const auto trace_one = [&](std::size_t i) {
+    if (wanted.is_overtaken && wanted.is_overtaken()) return;
+    Block block;
+    trace_block(wanted.stream, {wanted.range.first + found.unfinished[i], 1}, wanted.fraction, block);
+    for (KeptPhoton& one : block.kept) one.photon = found.unfinished[i];
+    rest[i] = {std::move(block.kept), block.traced.counts, {}};
+  };
+  rays_.for_each(settings_.threads, rest.size(), trace_one, CallMemory::Small);
+  for (const DevicePhotons& one : rest) {
+    append(found.kept, one.kept);
+    found.counts += one.counts;
+  }
+  std::ranges::stable_sort(found.kept, {}, &KeptPhoton::photon);
 }
 
 void PhotonTracer::start(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const {

@@ -76,8 +76,8 @@ struct KeptPhoton {
 /// Photons that a device is to trace.
 struct PhotonsToTrace {
   std::uint64_t stream = 0;  ///< photon_stream()
-  PhotonRange range;
-  double fraction = 1.0;  ///< of its light's flux that each carries
+  PhotonRange range;         ///< up to PhotonDevice::max_photons()
+  double fraction = 1.0;     ///< of its light's flux that each carries
   const PhotonSettings& settings;
   const std::function<bool()>& is_overtaken;  ///< asked now and then: the rest means nothing then; may be empty
 };
@@ -98,8 +98,9 @@ class PhotonDevice {
   PhotonDevice(const PhotonDevice&) = delete;
   PhotonDevice& operator=(const PhotonDevice&) = delete;
 
-  /// Adds to `traced`.
-  virtual void trace(const PhotonsToTrace& wanted, DevicePhotons& traced) = 0;
+  /// How many it traces at once.
+  [[nodiscard]] virtual std::uint64_t max_photons() const = 0;
+  [[nodiscard]] virtual DevicePhotons trace(const PhotonsToTrace& wanted) = 0;
   /// How long the device was at its steps since the last call: always the same steps.
   [[nodiscard]] virtual std::vector<PassTime> take_times() = 0;
 };
@@ -141,6 +142,7 @@ class PhotonTracer {
   struct Block;
 
   [[nodiscard]] TracedPhotons trace_on_device(const PhotonsToTrace& wanted) const;
+  void finish(const PhotonsToTrace& wanted, DevicePhotons& found) const;
   void trace_block(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const;
   void start(std::uint64_t stream, const PhotonRange& range, double fraction, Block& block) const;
   void move(Block& block) const;

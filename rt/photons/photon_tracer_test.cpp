@@ -148,6 +148,70 @@ TEST(PhotonTracerTest, MorePhotonsThanMayBeKeptAreAnError) {
   }
 }
 
+/// Traces a hundred photons at once, by the CPU, and leaves out every third.
+class LeavingDevice final : public PhotonDevice {
+ public:
+  explicit LeavingDevice(const PhotonTracer& by) : by_(by) {}
+
+  [[nodiscard]] std::uint64_t max_photons() const override { return 100; }
+  [[nodiscard]] DevicePhotons trace(const PhotonsToTrace& wanted) override {
+    ++calls;
+    EXPECT_LE(wanted.range.count, max_photons());
+    DevicePhotons left;
+    for (std::uint32_t i = 0; i < wanted.range.count; ++i) {
+      if ((wanted.range.first + i) % 3 == 0) {
+        left.unfinished.push_back(i);
+        continue;
+      }
+      const TracedPhotons one = by_.trace({}, {wanted.range.first + i, 1}, kPhotons);
+      for (const Photon& photon : one.caustic) left.kept.push_back({i, true, photon});
+      for (const Photon& photon : one.global) left.kept.push_back({i, false, photon});
+      left.counts += one.counts;
+    }
+    left.counts.caustic = left.counts.global = 0;
+    return left;
+  }
+  [[nodiscard]] std::vector<PassTime> take_times() override { return {}; }
+
+  static constexpr std::uint64_t kPhotons = 1000;
+  int calls = 0;
+
+ private:
+  const PhotonTracer& by_;
+};
+
+TEST(PhotonTracerTest, WhatADeviceTracesAndWhatItLeavesAreOne) {
+  constexpr std::uint64_t kPhotons = LeavingDevice::kPhotons;
+  const PhotonRoom room = furnished_room();
+  const PhotonTracer cpu = room.tracer(test::glowing_room());
+  const TracedPhotons expected = cpu.trace({}, {0, kPhotons}, kPhotons);
+  EXPECT_GT(expected.caustic.size(), 100U);
+  LeavingDevice device(cpu);
+  PhotonTracer tracer = room.tracer(test::glowing_room(), {.threads = 2});
+  tracer.trace_on(&device);
+  const TracedPhotons all = tracer.trace({}, {0, kPhotons}, kPhotons);
+  EXPECT_TRUE(same(all, expected));
+  EXPECT_EQ(all.counts, expected.counts);
+  EXPECT_EQ(device.calls, 10);
+  (void)tracer.trace({}, {0, kPhotons}, kPhotons, [&] { return device.calls >= 13; });
+  EXPECT_EQ(device.calls, 13) << "goes on with photons that nobody wants";
+}
+
+TEST(PhotonTracerTest, DevicesTraceNoMoreOncePhotonsAreTooMany) {
+  constexpr std::uint64_t kPhotons = LeavingDevice::kPhotons;
+  const PhotonRoom room = diffuse_room(0.5F);
+  const PhotonTracer cpu = room.tracer(test::glowing_room());
+  const std::uint64_t kept = cpu.trace({}, {0, kPhotons}, kPhotons).global.size();
+  LeavingDevice device(cpu);
+  PhotonTracer tracer = room.tracer(test::glowing_room(), {.max_kept = kept});
+  tracer.trace_on(&device);
+  EXPECT_EQ(tracer.trace({}, {0, kPhotons}, kPhotons).global.size(), kept);
+  device.calls = 0;
+  tracer.set_max_kept(kept / 2);
+  EXPECT_THROW((void)tracer.trace({}, {0, kPhotons}, kPhotons), Error);
+  EXPECT_LE(device.calls, 7);
+}
+
 TEST(PhotonTracerTest, WhatPassesADecalFallsOnTheFloorItLiesOn) {
   // What the floor sends back to the walls of all that falls on it, in watts.
   const auto sent_back = [](std::optional<float> gap) {
