@@ -65,6 +65,7 @@ def nearly_equal(folder, expected, found, what, allowed=1e-5):
 
 def light_of_scenes(folder):
     """By the same numbers along the same paths, so nearly the same pictures."""
+    traced = set()
     for scene in SCENES:
         kinds = [("--photons", "0"), ("--photons", "20000"), ("--photons", "20000", "--denoise")]
         for kind in kinds if scene in DENOISED else kinds[:2]:
@@ -75,7 +76,9 @@ def light_of_scenes(folder):
             expect("light: on the device" in words, f"{scene}: the CPU lights: {said.stderr[-400:]}")
             sends = "pass photon: on" in words
             expect(("photons: traced on the device" in words) == sends, f"{scene}: does not say who traces photons: {words[-800:]}")
+            traced |= {scene} if sends else set()
             nearly_equal(folder, "cpu.exr", "gpu.exr", f"{scene} {kind}")
+    expect({"gen:gallery", "gen:extensions"} <= traced, f"photons are traced of {traced} alone")
 
 
 def spreads(folder):
