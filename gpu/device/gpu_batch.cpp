@@ -157,17 +157,17 @@ void GpuBatch::submit() {
   in_flight_ = true;
 }
 
-void GpuBatch::wait() {
+void GpuBatch::wait(int limits) {
   if (!in_flight_) return;
   auto until = vulkan_structure<VkSemaphoreWaitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO);
   until.semaphoreCount = 1;
   until.pSemaphores = &semaphore_;
   until.pValues = &submitted_;
-  const auto limit = static_cast<std::uint64_t>(std::chrono::nanoseconds(device_.limit()).count());
+  const auto limit = static_cast<std::uint64_t>(std::chrono::nanoseconds(limits * device_.limit()).count());
   const VkResult result = device_.vk().WaitSemaphores(device_.handle(), &until, limit);
   is_late_ = result == VK_TIMEOUT;
   in_flight_ = result == VK_TIMEOUT;
-  device_.check(result, "computing");
+  device_.check(result, "computing", limits);
   read_times();
   trace_times();
 }

@@ -40,6 +40,14 @@ class GpuBatch {
     static_assert(std::is_trivially_copyable_v<Constants>);
     run(kernel, threads, std::as_bytes(std::span(&constants, 1)));
   }
+  /// Has a software device compile a kernel, as it does when that runs first. That takes seconds, of large ones many:
+  /// waits for up to four of the device's limits. `constants`: by which the one thread does nothing.
+  template <typename Constants>
+  void compile(const GpuKernel& kernel, const Constants& constants) {
+    run(kernel, 1, constants);
+    submit();
+    wait(4);
+  }
   /// Bytes from the start of one buffer to that of the other.
   void copy(const GpuBuffer& from, const GpuBuffer& to, std::size_t bytes);
   /// Sets every four bytes of a buffer; its size is a multiple of four.
@@ -47,9 +55,9 @@ class GpuBatch {
 
   /// Sends what was recorded on its way.
   void submit();
-  /// Until it is done. Throws Error: Hang past the device's limit, after which it may be waited for again; NoDevice
-  /// where the device was lost.
-  void wait();
+  /// Until it is done. Throws Error: Hang past so many of the device's limits, after which it may be waited for again;
+  /// NoDevice where the device was lost.
+  void wait(int limits = 1);
   /// Of the last batch that was waited for; empty where it had no passes or the device
   /// has no clock.
   [[nodiscard]] const std::vector<GpuPassTime>& times() const { return times_; }

@@ -358,7 +358,7 @@ std::uint64_t GpuDevice::heap_bytes(int memory_type) const {
   return memory_.memoryHeaps[memory_.memoryTypes[memory_type].heapIndex].size;
 }
 
-void GpuDevice::check(VkResult result, std::string_view doing) const {
+void GpuDevice::check(VkResult result, std::string_view doing, int limits) const {
   if (result == VK_SUCCESS) return;
   const std::string who = fmt::format("Vulkan device {} ({})", info_.index, info_.name);
   switch (result) {
@@ -372,7 +372,8 @@ void GpuDevice::check(VkResult result, std::string_view doing) const {
                   fmt::format("it has {} of its own: give it less, or end other programs that use it",
                               format_bytes(info_.memory)));
     case VK_TIMEOUT:
-      throw Error(ExitCode::Hang, fmt::format("{} has not answered for {} s while {}", who, limit_.count(), doing),
+      throw Error(ExitCode::Hang,
+                  fmt::format("{} has not answered for {} s while {}", who, (limits * limit_).count(), doing),
                   "see what the system's log says of it (dmesg)");
     default:
       throw Error(ExitCode::Internal, fmt::format("{}: VkResult {} while {}", who, static_cast<int>(result), doing));

@@ -85,8 +85,8 @@ class GpuDevice {
   [[nodiscard]] bool is_given_up() const { return given_up_; }
 
   /// Throws Error unless `result` is a success: NoDevice for a device that was lost, Limit for memory that is used up,
-  /// else Internal. `doing`: "allocating 4.0 GiB".
-  void check(VkResult result, std::string_view doing) const;
+  /// else Internal. `doing`: "allocating 4.0 GiB". `limits`: how many times limit() was waited for.
+  void check(VkResult result, std::string_view doing, int limits = 1) const;
 
  private:
   struct Instance;

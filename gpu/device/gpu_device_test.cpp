@@ -10,6 +10,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "gpu/device/gpu_batch.h"
@@ -168,6 +169,24 @@ TEST(GpuErrors, WorkThatDoesNotEndIsGivenUpAndMayBeWaitedForAgain) {
   EXPECT_EQ(code(), ExitCode::Hang);
   __atomic_fetch_or(&number.mapped<std::uint32_t>()[0], 1U, __ATOMIC_RELAXED);
   EXPECT_EQ(code(), ExitCode::Done);
+}
+
+TEST(GpuErrors, WorkMayBeWaitedForLongerThanTheLimit) {
+  const int which = test::usable_gpu(true);
+  if (which < 0) GTEST_SKIP() << "no device on the CPU";
+  const GpuDevice device({.device = which, .limit = std::chrono::seconds(1)});
+  const GpuBuffer number(device, 4, GpuMemory::Readback);
+  number.mapped<std::uint32_t>()[0] = 0;
+  const GpuKernel endless(device, count_until_odd, sizeof(std::uint64_t));
+  GpuBatch batch(device);
+  batch.run(endless, std::uint64_t{1} << 22U, number.address());
+  batch.submit();
+  std::thread ends([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1300));
+    __atomic_fetch_or(&number.mapped<std::uint32_t>()[0], 1U, __ATOMIC_RELAXED);
+  });
+  EXPECT_NO_THROW(batch.wait(60));
+  ends.join();
 }
 
 TEST(GpuErrors, ADeviceWhoseWorkDoesNotEndIsLeftAsItIs) {

@@ -139,14 +139,10 @@ GpuPhotonTracer::GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs&
   compile();
 }
 
-/// Software devices compile a kernel when it runs first, which takes seconds: each for itself, as waits have a limit.
+/// Each for itself, as waits have a limit.
 void GpuPhotonTracer::compile() {
   if (!device_.info().software) return;
-  for (const auto& kernel : kernels_) {
-    batch_.run(*kernel, 1, Constants{input_.address(), 0, 0});
-    batch_.submit();
-    batch_.wait();
-  }
+  for (const auto& kernel : kernels_) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
 }
 
 std::vector<PassTime> GpuPhotonTracer::take_times() {

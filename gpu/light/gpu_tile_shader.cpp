@@ -198,14 +198,11 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
   }
 }
 
-/// Software devices compile a kernel when it runs first, which takes seconds: each for itself, as waits have a limit.
+/// Each for itself, as waits have a limit.
 void GpuTileShader::compile() {
   if (!device_.info().software) return;
   for (const auto& kernel : kernels_) {
-    if (!kernel) continue;
-    batch_.run(*kernel, 1, Constants{input_.address(), 0, 0});
-    batch_.submit();
-    batch_.wait();
+    if (kernel) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
   }
 }
 
