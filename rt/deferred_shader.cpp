@@ -420,7 +420,6 @@ void DeferredShader::State::gather_counts(double spent_ms) {
     counts.invalid += traced.invalid;
     counts.cut += traced.cut;
   }
-  warn_of_cut_rays();
   times = {{"surface", ms[kSurfaceStep]}, {"direct", ms[kDirectStep]}};
   for (std::size_t i = 0; i < passes.size(); ++i) {
     double& spent = ms[kFirstPassStep + i];
@@ -541,10 +540,12 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, std::span<cons
     state.shade_part(call, {.tile = order[i]});
   });
   state.gather_counts(watch.ms() * state.settings.threads);
-  if (!state.device) return;
-  state.counts += done.traced;
-  add_times(*state.device, done.ms * state.settings.threads, state.settings.threads, state.times);
-  for (const std::size_t tile : tiles) state.costs.push_back({tile, before_ms / static_cast<double>(tiles.size())});
+  if (state.device) {
+    state.counts += done.traced;
+    add_times(*state.device, done.ms * state.settings.threads, state.settings.threads, state.times);
+    for (const std::size_t tile : tiles) state.costs.push_back({tile, before_ms / static_cast<double>(tiles.size())});
+  }
+  state.warn_of_cut_rays();
 }
 
 void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart& next) {
@@ -562,6 +563,7 @@ void DeferredShader::shade(std::span<const ShadedSample> samples, const NextPart
     }
   });
   state.gather_counts(watch.ms() * state.settings.threads);
+  state.warn_of_cut_rays();
 }
 
 bool DeferredShader::is_whole() const {

@@ -5,6 +5,8 @@ import itertools
 import json
 import struct
 
+import png
+
 FRONT = (0, 1, 2, 0, 2, 3)  # counterclockwise as seen from +z
 BACK = (0, 2, 1, 0, 3, 2)
 
@@ -30,7 +32,14 @@ class Quads:
         self.gltf["materials"].append(made | fields)
         return len(self.gltf["materials"]) - 1
 
-    def mesh(self, material, corners=((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)), indices=FRONT, normals=None):
+    def texture(self, width, height, values):
+        """`values`: RGBA, 8 bits each, row by row."""
+        uri = "data:image/png;base64," + base64.b64encode(png.encode(width, height, values)).decode()
+        for name, item in (("images", {"uri": uri}), ("textures", {"source": len(self.gltf.get("images", []))})):
+            self.gltf.setdefault(name, []).append(item)
+        return {"index": len(self.gltf["textures"]) - 1}
+
+    def mesh(self, material, corners=((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)), indices=FRONT, normals=None, uvs=None):
         """`corners`: any number, wound by `indices`; flat without normals."""
         points = struct.pack(f"<{3 * len(corners)}f", *itertools.chain(*corners))
         rounded = list(struct.iter_unpack("<3f", points))
@@ -42,6 +51,9 @@ class Quads:
         if normals is not None:
             packed = struct.pack(f"<{3 * len(normals)}f", *itertools.chain(*normals))
             primitive["attributes"]["NORMAL"] = self._accessor(packed, componentType=5126, count=len(normals), type="VEC3")
+        if uvs is not None:
+            packed = struct.pack(f"<{2 * len(uvs)}f", *itertools.chain(*uvs))
+            primitive["attributes"]["TEXCOORD_0"] = self._accessor(packed, componentType=5126, count=len(uvs), type="VEC2")
         if material is not None:
             primitive["material"] = material
         self.gltf["meshes"].append({"primitives": [primitive]})

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`--backend vulkan`: the keys of a device are those of Embree's rays, whoever draws what, and what a device cannot do is done or said.
+"""`--backend vulkan` and `auto`: who makes keys and light is said and kept to, and what a device cannot do is done or said.
 
 usage: vulkan_test.py HPR
 
@@ -7,86 +7,12 @@ Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
 """
 
 import json
-import os
 import pathlib
-import struct
 import sys
 import tempfile
 
 from program import expect, failures, run
-
-# What devices are compared with is the CPU's and OpenGL's, on machines with a GPU as well.
-NO_VULKAN = {**os.environ, "VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
-
-SIZE = (96, 72)
-OTHERS = 0.0005  # of the pixels may show another surface
-OTHERS_LIT = 0.05  # a ray of theirs meets another surface, or a sample more is taken
-SCENES = ("gen:cornell", "gen:gallery", "gen:sphereflake?s=2", "gen:tetra?s=5", "gen:asteroids", "gen:extensions", "gen:cloud?count=2000")
-DENOISED = ("gen:cornell", "gen:gallery", "gen:extensions")
-SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "4") for distribution in ("sort-first", "sort-last", "hybrid")]
-
-
-def hpr(folder, *arguments, code=0):
-    result = run(folder, *arguments, env=None if "vulkan" in arguments else NO_VULKAN)
-    expect(result.returncode == code, f"{' '.join(arguments)}: left with {result.returncode}: {result.stderr[-800:]}")
-    return result
-
-
-def render(folder, scene, *arguments, photons="2000"):
-    """The bytes of the keys and of the picture."""
-    hpr(folder, "render", scene, "--size", f"{SIZE[0]}x{SIZE[1]}", "--photons", photons, "--raw", "a.keys", "-o", "a.exr", "--force", *arguments)
-    return (folder / "a.keys").read_bytes(), (folder / "a.exr").read_bytes()
-
-
-def surfaces(keys):
-    return [~key & 0xFFFFFFFF for key in struct.unpack(f"<{SIZE[0] * SIZE[1]}Q", keys)]
-
-
-def has_device(folder):
-    findings = json.loads(run(folder, "doctor", "--json").stdout)["findings"]
-    return next(finding for finding in findings if finding["name"] == "Vulkan")["status"] == "ok"
-
-
-def keys_of_scenes(folder):
-    for scene in SCENES:
-        quick = ("--quality", "draft", "--spp", "1")
-        expected = surfaces(render(folder, scene, "--primary", "rays", *quick, photons="0")[0])
-        found = surfaces(render(folder, scene, "--backend", "vulkan", *quick, photons="0")[0])
-        others = sum(a != b for a, b in zip(found, expected))
-        expect(others <= OTHERS * len(found), f"{scene}: {others} of {len(found)} pixels show another surface than Embree's")
-        expect(len(set(found)) > 5, f"{scene}: shows {len(set(found))} surfaces")
-
-
-def nearly_equal(folder, expected, found, what, allowed=1e-5):
-    diff = json.loads(run(folder, "diff", expected, found, "--json").stdout)
-    expect(diff["relmse_untrimmed"] <= allowed and diff["not_finite"] == 0, f"{what}: relMSE {diff['relmse_untrimmed']}")
-    expect(diff["differing"] <= OTHERS_LIT * diff["pixels"] or diff["max"] < 1e-3, f"{what}: {diff['differing']} pixels differ")
-
-
-def light_of_scenes(folder):
-    """By the same numbers along the same paths, so nearly the same pictures."""
-    traced = set()
-    for scene in SCENES:
-        kinds = [("--photons", "0"), ("--photons", "20000"), ("--photons", "20000", "--denoise")]
-        for kind in kinds if scene in DENOISED else kinds[:2]:
-            settings = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "draft", "--spp", "1", *kind, "--force")
-            hpr(folder, "render", scene, "-o", "cpu.exr", "--primary", "rays", *settings)
-            said = hpr(folder, "render", scene, "-o", "gpu.exr", "--backend", "vulkan", "--explain", *settings)
-            words = said.stdout + said.stderr
-            expect("light: on the device" in words, f"{scene}: the CPU lights: {said.stderr[-400:]}")
-            sends = "pass photon: on" in words
-            expect(("photons: traced on the device" in words) == sends, f"{scene}: does not say who traces photons: {words[-800:]}")
-            traced |= {scene} if sends else set()
-            nearly_equal(folder, "cpu.exr", "gpu.exr", f"{scene} {kind}")
-    expect({"gen:gallery", "gen:extensions"} <= traced, f"photons are traced of {traced} alone")
-
-
-def spreads(folder):
-    lit = ("--backend", "vulkan", "--spp", "2", "--quality", "draft")
-    for kind, spreads_of_kind in (((), SPREADS), (("--denoise",), SPREADS[2:4])):
-        alone = render(folder, "gen:gallery", *lit, *kind)
-        for spread in spreads_of_kind:
-            expect(render(folder, "gen:gallery", *lit, *kind, *spread) == alone, f"other bits with {' '.join(kind + spread)}")
+from vulkan_program import has_device, hpr, nearly_equal, render
 
 
 def left_open(folder):
@@ -188,9 +114,6 @@ def main():
         if not has_device(folder):
             print("Vulkan has no device here that can do hpr's work")
             return 77
-        keys_of_scenes(folder)
-        light_of_scenes(folder)
-        spreads(folder)
         left_open(folder)
         device_row(folder)
         target_time(folder)

@@ -9,7 +9,8 @@
 
 namespace hpr {
 
-GpuKernel::GpuKernel(const GpuDevice& device, std::span<const std::uint32_t> spirv, std::size_t constants)
+GpuKernel::GpuKernel(const GpuDevice& device, std::span<const std::uint32_t> spirv, std::size_t constants,
+                     std::uint32_t variant)
     : device_(device), constants_(constants) {
   HPR_CHECK(constants > 0 && constants <= kMaxKernelConstants && constants % 4 == 0);
   const VulkanFunctions& vk = device.vk();
@@ -33,6 +34,9 @@ GpuKernel::GpuKernel(const GpuDevice& device, std::span<const std::uint32_t> spi
     pipeline.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
     pipeline.stage.module = module;
     pipeline.stage.pName = "main";
+    const VkSpecializationMapEntry entry{0, 0, sizeof variant};
+    const VkSpecializationInfo special{1, &entry, sizeof variant, &variant};
+    pipeline.stage.pSpecializationInfo = &special;
     pipeline.layout = layout_;
     made = vk.CreateComputePipelines(device.handle(), VK_NULL_HANDLE, 1, &pipeline, nullptr, &pipeline_);
     vk.DestroyShaderModule(device.handle(), module, nullptr);

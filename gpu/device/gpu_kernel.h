@@ -17,8 +17,10 @@ inline constexpr std::size_t kMaxKernelConstants = 128;
 /// A shader of gpu/shaders, ready to run. The device must outlive it.
 class GpuKernel {
  public:
-  /// `spirv`: the words of the compiled shader. `constants`: bytes of its push constants.
-  GpuKernel(const GpuDevice& device, std::span<const std::uint32_t> spirv, std::size_t constants);
+  /// `spirv`: the words of the compiled shader. `constants`: bytes of its push constants. `variant`: the value of its
+  /// specialization constant 0, where it has one: what that leaves out is never compiled.
+  GpuKernel(const GpuDevice& device, std::span<const std::uint32_t> spirv, std::size_t constants,
+            std::uint32_t variant = 0);
   ~GpuKernel();
   GpuKernel(const GpuKernel&) = delete;
   GpuKernel& operator=(const GpuKernel&) = delete;

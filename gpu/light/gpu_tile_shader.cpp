@@ -42,6 +42,7 @@ struct GpuPathLimits {
 /// As in light_state.glsl.
 struct GpuLightInput {
   std::uint64_t scene = 0;
+  std::uint64_t alpha_tested = 0;
   std::uint64_t surfaces = 0;
   std::uint64_t materials = 0;
   std::uint64_t lights = 0;
@@ -70,7 +71,7 @@ struct GpuLightInput {
   std::uint32_t max_waiting = 0;
   std::uint32_t padding = 0;
 };
-static_assert(sizeof(GpuLightInput) == 216);
+static_assert(sizeof(GpuLightInput) == 224);
 static_assert(sizeof(EyePoint) == 80 && sizeof(PointLight) == 80);
 
 namespace {
@@ -78,6 +79,11 @@ namespace {
 /// Vertices of a pixel that may wait: two surfaces that a path begins with may split into all lobes and channels, what
 /// comes after does not.
 constexpr std::uint32_t kMaxWaiting = 12;
+/// And surfaces that cover in part of what the pixel shows; the CPU finishes tiles that show more of them.
+constexpr std::uint32_t kMaxLayers = 20;
+
+/// Of pixels that are left out, as in light_state.glsl: one that no surface has.
+constexpr Key kUnwanted = Key{1} << 32U;
 
 /// As in light_state.glsl.
 struct GpuTile {
@@ -93,10 +99,12 @@ struct Constants {
   std::uint32_t padding;
 };
 
-/// As light_state.glsl counts rays; behind them the pixels that are not done.
+/// As light_state.glsl counts rays; behind them the pixels that are not done, and rays that were cut.
 constexpr std::array kCountedPasses{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion};
 
-constexpr std::size_t kCounters = kCountedPasses.size() + 1;
+constexpr std::size_t kWaitingPixels = kCountedPasses.size();
+constexpr std::size_t kCutRays = kWaitingPixels + 1;
+constexpr std::size_t kCounters = kCutRays + 1;
 
 /// Lit at once: a batch has a time limit, and each pixel has kilobytes of memory while it is lit.
 constexpr std::size_t kSoftwareTiles = 4;
@@ -148,6 +156,18 @@ bool emits_through_coat(const Material& material) {
   return material.extensions && material.extensions->clearcoat > 0.0F && material.emissive != glm::vec3(0.0F);
 }
 
+/// Of a tile: those for which a mask, where there is one, wants light.
+std::uint64_t wanted_pixels(const Rect& pixels, std::span<const std::uint8_t> wanted) {
+  std::uint64_t count = 0;
+  for (int y = 0; y < pixels.height(); ++y) {
+    const std::size_t row = static_cast<std::size_t>(y) * kTileSide;
+    for (int x = 0; x < pixels.width(); ++x) {
+      count += wanted.empty() || wanted[row + static_cast<std::size_t>(x)] != 0 ? 1U : 0U;
+    }
+  }
+  return count;
+}
+
 void grow_to(const GpuDevice& device, std::optional<GpuBuffer>& buffer, std::size_t bytes, GpuMemory memory) {
   if (buffer && buffer->bytes() >= bytes) return;
   buffer.reset();
@@ -165,7 +185,6 @@ std::string refusal_of_light(const Scene& scene, const RaySettings& settings, st
   if (settings.light_samples > kMaxLightSamples) {
     return fmt::format("more than {} light samples are the CPU's", kMaxLightSamples);  // a batch has a time limit
   }
-  if (has_coverage(scene)) return "surfaces that cover in part are the CPU's";
   if (std::ranges::any_of(scene.materials, emits_through_coat)) return "emission through clear coats is the CPU's";
   return {};
 }
@@ -173,7 +192,7 @@ std::string refusal_of_light(const Scene& scene, const RaySettings& settings, st
 GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& inputs, int threads)
     : device_(device),
       inputs_(inputs),
-      scene_(device, inputs.scene, std::array{SurfaceRange{0, inputs.scene.triangles}}, threads),
+      scene_(device, inputs.scene, covering_surfaces(inputs.scene, false), threads),
       surfaces_(device, inputs.scene, inputs.surfaces),
       materials_(device, inputs.scene),
       lights_(device, inputs.scene, inputs.lights, materials_),
@@ -181,16 +200,20 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
       input_(device, sizeof(GpuLightInput), GpuMemory::Upload),
       counters_(device, kCounters * sizeof(std::uint32_t), GpuMemory::Readback),
       batch_(device) {
+  const auto with_alpha = covering_surfaces(inputs.scene, true);
+  if (!with_alpha.empty()) alpha_tested_.emplace(device, inputs.scene, with_alpha, threads);
+  max_waiting_ = kMaxWaiting + (alpha_tested_ ? kMaxLayers : 0);
   const bool extended = has_extensions(inputs.scene);
   for (const StepInfo& step : steps()) {
     const auto shader = extended ? step.shader : step.plain_shader;
     const bool runs = !step.pass || runs_pass(inputs.plan, *step.pass);
-    kernels_.push_back(runs ? std::make_unique<GpuKernel>(device, shader, sizeof(Constants)) : nullptr);
+    const std::uint32_t has_coverage = alpha_tested_ ? 1 : 0;
+    kernels_.push_back(runs ? std::make_unique<GpuKernel>(device, shader, sizeof(Constants), has_coverage) : nullptr);
     times_.push_back({std::string(step.name), 0.0, step.pass});
   }
   const auto layout = extended ? steps()[Vertex].shader : steps()[Vertex].plain_shader;
   state_bytes_ = array_stride(layout, "PixelState");
-  waiting_bytes_ = kMaxWaiting * array_stride(layout, "FoundVertex");
+  waiting_bytes_ = max_waiting_ * array_stride(layout, "FoundVertex");
   compile();
   if (runs_pass(inputs.plan, PassId::Photon) && refusal_of_photons(inputs.scene).empty()) {
     const GpuPhotonInputs traced{scene_.address(), surfaces_.address(), materials_.address(), lights_.address()};
@@ -262,7 +285,7 @@ void GpuTileShader::finish_batch() {
 
 /// Shades vertex after vertex of all pixels' paths, until none waits; false where that was overtaken.
 bool GpuTileShader::follow_paths(std::size_t tiles, bool with_photons, const std::function<bool()>& is_overtaken) {
-  std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kCountedPasses.size()];
+  std::uint32_t& waiting = counters_.mapped<std::uint32_t>()[kWaitingPixels];
   run_step(Start, tiles);
   while (true) {
     waiting = 0;
@@ -295,6 +318,7 @@ bool GpuTileShader::light(const GpuLightInput& input, std::size_t tiles, const s
   for (std::size_t i = 0; i < kCountedPasses.size(); ++i) {
     counts[kCountedPasses.at(i)] += counters_.mapped<std::uint32_t>()[i];
   }
+  counts.cut += counters_.mapped<std::uint32_t>()[kCutRays];
   return true;
 }
 
@@ -302,6 +326,7 @@ bool GpuTileShader::light(const GpuLightInput& input, std::size_t tiles, const s
 GpuLightInput GpuTileShader::input_of(bool with_photons) const {
   const RaySettings& settings = inputs_.settings;
   GpuLightInput input{.scene = scene_.address(),
+                      .alpha_tested = alpha_tested_ ? alpha_tested_->address() : 0,
                       .surfaces = surfaces_.address(),
                       .materials = materials_.address(),
                       .lights = lights_.address(),
@@ -319,7 +344,7 @@ GpuLightInput GpuTileShader::input_of(bool with_photons) const {
                       .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
   input.shadows = runs_pass(inputs_.plan, PassId::Shadow) ? 1 : 0;
   input.terminator_fix = settings.terminator_fix ? 1 : 0;
-  input.max_waiting = kMaxWaiting;
+  input.max_waiting = max_waiting_;
   return input;
 }
 
@@ -343,8 +368,9 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
     std::ranges::copy(sample.keys->tile(tiles[i]), keys.begin());
     const std::span<const std::uint8_t> wanted = mask_of(sample.wanted, tiles[i]);
     for (std::size_t pixel = 0; pixel < wanted.size(); ++pixel) {
-      if (wanted[pixel] == 0) keys[pixel] = kNoKey;  // nothing of it is stored
+      if (wanted[pixel] == 0) keys[pixel] = kUnwanted;
     }
+    if (alpha_tested_) counts.primary += wanted_pixels(location.pixels, wanted);
   }
   GpuLightInput input = input_of(lit.photons != nullptr);
   input.keys = keys_->address();

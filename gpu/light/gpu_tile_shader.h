@@ -57,7 +57,8 @@ class GpuTileShader final : public TileShader {
 
   const GpuDevice& device_;
   ShadingInputs inputs_;
-  GpuScene scene_;
+  GpuScene scene_;                             ///< surfaces that cover all behind them
+  std::optional<GpuScene> alpha_tested_ = {};  ///< the others, where there are some
   GpuSurfaces surfaces_;
   GpuMaterials materials_;
   GpuLights lights_;
@@ -65,6 +66,7 @@ class GpuTileShader final : public TileShader {
   std::optional<SampleNumber> held_photons_ = {};    ///< the sample whose photons those are
   std::vector<std::unique_ptr<GpuKernel>> kernels_;  ///< by step; null where its pass does not run
   std::vector<PassTime> times_;                      ///< by step
+  std::uint32_t max_waiting_ = 0;                    ///< vertices of a pixel
   std::size_t state_bytes_ = 0;                      ///< of a pixel while it is lit
   std::size_t waiting_bytes_ = 0;                    ///< of the vertices that may wait for it
   GpuBuffer input_;

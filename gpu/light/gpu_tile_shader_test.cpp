@@ -12,6 +12,7 @@
 
 #include "gpu/device/test_gpu.h"
 #include "rt/test_scene.h"
+#include "rt/trace/coverage_traversal.h"
 #include "rt/trace/primary_rays.h"
 #include "scene/load_scene.h"
 #include "scene/requirements.h"
@@ -101,6 +102,9 @@ class GpuTileShaderTest : public test::OnGpu {
     EXPECT_GT(static_cast<double>(lit), 0.2 * pixels);
     EXPECT_LE(static_cast<double>(off), others * pixels);
     EXPECT_NEAR(other_sum / sum, 1.0, 0.005);
+    EXPECT_EQ(gpu.by_cpu_ms, 0.0) << "the CPU lit some tiles";
+    EXPECT_EQ(gpu.counts.primary, cpu.counts.primary);
+    EXPECT_EQ(gpu.counts.cut, cpu.counts.cut);
     for (const PassId pass : {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion}) {
       const auto traced = static_cast<double>(cpu.counts[pass]);
       EXPECT_NEAR(static_cast<double>(gpu.counts[pass]), traced, 0.01 * traced + 1.0) << static_cast<int>(pass);
@@ -191,7 +195,8 @@ TEST_F(GpuTileShaderTest, IsDenoised) {
   expect_as_cpu(room, settings, view_of(room, {80, 48}), "room", 0.05);  // a filter spreads a ray that differs
 }
 
-/// Glass that disperses and is hardly rough: chance picks a channel at the first surface, on the CPU before it does on the device.
+/// Glass that disperses and is hardly rough: chance picks a channel at the first surface, on the CPU before it does on
+/// the device.
 TEST_F(GpuTileShaderTest, DrawsWhatTheCpuDrawsWhereItIsDenoised) {
   Scene scene = test::white_floor();
   Material glass = test::clear_glass(1.5F, 1.0F);
@@ -206,6 +211,105 @@ TEST_F(GpuTileShaderTest, DrawsWhatTheCpuDrawsWhereItIsDenoised) {
   RaySettings settings = plain_settings();
   settings.denoise = true;
   expect_as_cpu(scene, settings, test::view_from({0.2, 3, 0.1}, {0.2, 0, 0}, {40, 32}, scene, 0.6), "glass", 0.02);
+}
+
+/// The room's furniture behind and among surfaces that cover in part, some of which stand before the open window.
+Scene veiled_room() {
+  Scene scene = furnished_room();
+  const glm::dvec3 center = 0.5 * scene.bounds.low + 0.5 * scene.bounds.high;
+  const auto size = static_cast<float>(scene.bounds.high.y - scene.bounds.low.y);
+  Image<Rgba8> spots({4, 4});
+  for (int i = 0; i < 16; ++i) spots.at(i % 4, i / 4) = {230, 180, 90, static_cast<std::uint8_t>(17 * i)};
+  scene.textures.emplace_back().image = std::move(spots);
+  Material veil = test::diffuse({0.8F, 0.5F, 0.3F});
+  veil.double_sided = true;
+  veil.ior = 1.5F;
+  const auto add_pane = [&](AlphaMode mode, float alpha, bool is_textured, const glm::vec3& corner, float side) {
+    Material material = veil;
+    material.alpha_mode = mode;
+    material.base_color.a = alpha;
+    if (is_textured) material.base_color_texture.texture = static_cast<int>(scene.textures.size()) - 1;
+    place_mesh(scene, add_mesh(scene, quad(glm::vec3(center) + size * corner, {size * side, 0, 0}, {0, size * side, 0},
+                                           add_material(scene, material))));
+  };
+  for (int i = 0; i < 5; ++i) {
+    const float at = 0.1F * static_cast<float>(i);
+    add_pane(AlphaMode::Blend, 0.15F + at, i % 2 == 0, {at - 0.5F, at - 0.45F, 0.55F + 0.5F * at}, 0.5F);
+  }
+  scene.materials.back().emissive = {0.5F, 2.0F, 1.0F};
+  for (int i = 0; i < 3; ++i) {  // in one plane
+    const float at = 0.1F * static_cast<float>(i);
+    add_pane(AlphaMode::Blend, 0.4F, false, {at, 0.1F - at, 0.4F}, 0.3F);
+  }
+  add_pane(AlphaMode::Mask, 1.0F, true, {-0.3F, -0.4F, 0.2F}, 0.6F);
+  scene.materials.back().emissive = {2.0F, 0.5F, 0.5F};
+  finish_scene(scene);
+  return scene;
+}
+
+TEST_F(GpuTileShaderTest, LooksThroughSurfacesThatCoverInPart) {
+  const Scene scene = veiled_room();
+  const View view = view_of(scene, {64, 48});
+  expect_as_cpu(scene, plain_settings(), view, "veils");
+  RaySettings settings = plain_settings();
+  settings.denoise = true;
+  expect_as_cpu(scene, settings, view, "veils, denoised", 0.02);
+  settings.denoise = false;
+  settings.passes = {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion, PassId::Photon};
+  settings.photons = 20'000;
+  settings.global_photons = true;
+  settings.background = {Background::Kind::Color, {0.2F, 0.3F, 0.4F}};
+  expect_as_cpu(scene, settings, view, "veils with photons");
+}
+
+/// More layers than places where they may wait; of samples that are denoised the CPU finds them, and none waits.
+TEST_F(GpuTileShaderTest, LeavesManyLayersToTheCpu) {
+  Scene scene = test::white_floor();
+  Material thin = test::diffuse({0.5F, 0.6F, 0.7F});
+  thin.alpha_mode = AlphaMode::Blend;
+  thin.base_color.a = 0.05F;
+  const std::uint32_t veil = add_material(scene, thin);
+  for (int i = 0; i < 60; ++i) {
+    place_mesh(scene, add_mesh(scene, quad({-2, 0.01F * static_cast<float>(i + 1), 2}, {4, 0, 0}, {0, 0, -4}, veil)));
+  }
+  finish_scene(scene);
+  const View view = view_of(scene, {32, 24});
+  const Lit cpu = light(scene, plain_settings(), view, false);
+  const Lit gpu = light(scene, plain_settings(), view, true);
+  EXPECT_EQ(gpu.pixels, cpu.pixels);
+  EXPECT_GT(gpu.by_cpu_ms, 0.0) << "the device finished";
+  RaySettings denoised = plain_settings();
+  denoised.denoise = true;
+  expect_as_cpu(scene, denoised, view, "denoised", 0.02);
+}
+
+/// So many layers of next to nothing that rays from the eye end among them: whoever traces them says so.
+TEST_F(GpuTileShaderTest, SaysWhichRaysEndAmongLayers) {
+  Scene scene = test::white_floor();
+  Material next_to_nothing = test::diffuse();
+  next_to_nothing.alpha_mode = AlphaMode::Blend;
+  next_to_nothing.base_color.a = 1e-9F;
+  next_to_nothing.double_sided = true;
+  Mesh layers;
+  layers.material = add_material(scene, next_to_nothing);
+  for (std::uint32_t i = 0; i < kMaxPassed + 20; ++i) {
+    const float y = 0.1F + 0.001F * static_cast<float>(i);
+    layers.positions.insert(layers.positions.end(), {{-4, y, -4}, {-4, y, 4}, {4, y, 4}});
+    layers.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  place_mesh(scene, add_mesh(scene, layers));
+  scene.environment = test::even_light({0.4F, 0.6F, 0.8F});
+  finish_scene(scene);
+  RaySettings settings = plain_settings();
+  settings.passes = {PassId::Reflection};
+  const View view = test::view_from({0, 3, 0.1}, {0, 0, 0}, {8, 4}, scene, 0.6);
+  const Lit cpu = light(scene, settings, view, false);
+  testing::internal::CaptureStderr();
+  const Lit gpu = light(scene, settings, view, true);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("rays of a sample or a few passed 1000"), std::string::npos);
+  EXPECT_EQ(gpu.by_cpu_ms, 0.0) << "the CPU lit some tiles";
+  EXPECT_GT(gpu.counts.cut, 0U);
+  EXPECT_EQ(gpu.counts.cut, cpu.counts.cut);
 }
 
 /// What a thread's loops may not do on a software device is done by the CPU.
@@ -253,9 +357,6 @@ TEST(GpuLightRefusals, AreSaid) {
   EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.part.emplace(); }), "rays travel between ranks");
   EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.passes = {PassId::Gather}; }), "gathering by rays is the CPU's");
   EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.light_samples = 65; }), "more than 64 light samples are the CPU's");
-  Scene veiled = plain;
-  veiled.materials[0].alpha_mode = AlphaMode::Blend;
-  EXPECT_EQ(refusal(veiled, nothing), "surfaces that cover in part are the CPU's");
   Scene coated = plain;
   MaterialExtensions coat;
   coat.clearcoat = 1.0F;
@@ -265,8 +366,22 @@ TEST(GpuLightRefusals, AreSaid) {
 }
 
 /// Several screens, tiles at their edges, a mask, no bounces, and a background of its own.
-TEST_F(GpuTileShaderTest, LightsMasksAndScreensOfAllKinds) {
-  const Scene scene = load_scene("gen:gallery");
+class GpuTilesWithVeils : public GpuTileShaderTest, public testing::WithParamInterface<bool> {};
+
+TEST_P(GpuTilesWithVeils, LightsMasksAndScreensOfAllKinds) {
+  Scene scene = load_scene("gen:gallery");
+  if (GetParam()) {
+    Material veil = test::diffuse({0.8F, 0.5F, 0.3F});
+    veil.alpha_mode = AlphaMode::Blend;
+    veil.base_color.a = 0.6F;
+    veil.double_sided = true;
+    const glm::vec3 low = scene.bounds.low;
+    const glm::vec3 size = scene.bounds.high - scene.bounds.low;
+    const glm::vec3 corner = low + 0.4F * size;
+    place_mesh(scene,
+               add_mesh(scene, quad(corner, {0.4F * size.x, 0, 0}, {0, 0.4F * size.y, 0}, add_material(scene, veil))));
+    finish_scene(scene);
+  }
   View flat = view_of(scene, {70, 40});
   flat.orthographic = true;
   flat.near_distance = 0.01;
@@ -292,6 +407,7 @@ TEST_F(GpuTileShaderTest, LightsMasksAndScreensOfAllKinds) {
   std::vector<std::size_t> tiles(layout.tiles());
   std::iota(tiles.begin(), tiles.end(), std::size_t{0});
   std::vector<TileLayer<Rgb>> lit;
+  std::vector<std::uint64_t> found;
   for (const bool by_device : {false, true}) {
     MakeTileShader make;
     if (by_device) {
@@ -302,6 +418,7 @@ TEST_F(GpuTileShaderTest, LightsMasksAndScreensOfAllKinds) {
     const ShadedSample sample{views, &keys, {.radiance = &radiance}, {1, 7}, &wanted};
     shader.shade(std::span(&sample, 1), tiles);
     EXPECT_EQ(shader.counts()[PassId::Reflection], 0U);
+    found.push_back(shader.counts().primary);
   }
   std::size_t lit_pixels = 0;
   std::size_t others = 0;
@@ -313,9 +430,13 @@ TEST_F(GpuTileShaderTest, LightsMasksAndScreensOfAllKinds) {
       others += std::abs(a.r - b.r) + std::abs(a.g - b.g) + std::abs(a.b - b.b) > 1e-4F * (a.r + a.g + a.b) ? 1U : 0U;
     }
   }
+  EXPECT_EQ(found[0], found[1]);
+  EXPECT_EQ(found[0] > 0, GetParam());
   EXPECT_GT(lit_pixels, 500U);
   EXPECT_LE(others, lit_pixels / 200);
 }
+
+INSTANTIATE_TEST_SUITE_P(NoneAndOne, GpuTilesWithVeils, testing::Bool());
 
 }  // namespace
 }  // namespace hpr

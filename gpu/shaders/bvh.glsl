@@ -21,6 +21,7 @@ struct BoxRay {
   vec3 inverse;  // of the direction's components, none of them 0
   float slack;
   double start;  // multiple of the direction by which the origin was moved
+  float near;    // boxes that end before are left out; a multiple from there on
 };
 
 // `largest`: of the coordinates of all boxes it will be tested against.
@@ -29,6 +30,7 @@ BoxRay make_box_ray(dvec3 origin, dvec3 direction, float largest) {
   double squared = dot(direction, direction);
   double reach = 2.0 * double(largest) / sqrt(squared);  // they lie within sqrt(3) times the largest of the middle
   ray.start = max(dot(-origin, direction) / squared - reach, double(0.0));
+  ray.near = 0.0;
   ray.origin = vec3(origin + ray.start * direction);
   vec3 along = vec3(direction);
   for (int axis = 0; axis < 3; ++axis) {
@@ -47,7 +49,7 @@ float enters(BoxRay ray, BvhNode node, float limit) {
   vec3 b = (node.high + ray.slack - ray.origin) * ray.inverse;
   vec3 first = min(a, b);
   vec3 last = max(a, b);
-  float near = max(max(first.x, first.y), max(first.z, 0.0));
+  float near = max(max(first.x, first.y), max(first.z, ray.near));
   float far = min(min(last.x, last.y), min(last.z, limit));
   return near <= far ? near : -1.0;
 }

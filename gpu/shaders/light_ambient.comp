@@ -5,6 +5,7 @@
 
 #include "light_kernel.glsl"
 #include "trace.glsl"
+#include "light_rays.glsl"
 
 uint occlusion_rays = 0u;
 
@@ -19,10 +20,11 @@ dvec3 ambient_light(PathVertex point) {
     BsdfSample bounce;
     if (!bsdf_sample(point.bsdf, kDiffuse, next_two(random, 1u), bounce)) continue;
     TracedRay ray = TracedRay(ray_origin(point.surface, bounce.direction) + point.surface.lift, bounce.direction,
-                              work.occlusion_reach, true);
+                              work.occlusion_reach, true, kNothingPassed);
     ++occlusion_rays;
-    if (is_blocked(work.scene.tree, ray)) continue;
-    sum += point.throughput * bounce.weight * (point.material.occlusion * work.ambient / double(count));
+    double passed = passed_light(ray);
+    if (passed == 0.0lf) continue;
+    sum += passed * point.throughput * bounce.weight * (point.material.occlusion * work.ambient / double(count));
   }
   return sum;
 }
@@ -31,12 +33,13 @@ void shade() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
   PathVertex point = work.states.states[pixel_index].vertex;
   add_diffuse_light(point.depth, ambient_light(point));
-  note_cut_off(false);
+  note_cut_off(coverage_notes.is_unfinished);
 }
 
 void main() {
   start_counts();
   shade();
   atomicAdd(group_counts[kOcclusionRays], occlusion_rays);
+  count_cut_rays();
   add_counts();
 }

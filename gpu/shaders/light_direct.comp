@@ -6,6 +6,7 @@
 #include "light_kernel.glsl"
 #include "all_lights.glsl"
 #include "trace.glsl"
+#include "light_rays.glsl"
 
 uint shadow_rays = 0u;
 
@@ -28,6 +29,7 @@ TracedRay shadow_ray(PathVertex point, LightSample light) {
   ray.direction = light.to_light;
   ray.reach = light.distance;
   ray.meets_backs = true;
+  ray.passed = kNothingPassed;
   if (isinf(light.distance)) return ray;
   dvec3 to_goal = light.goal - ray.origin;
   double distance = length(to_goal);
@@ -64,7 +66,7 @@ dvec3 visible_light(PathVertex point, LightSample light) {
   if (radiance == dvec3(0.0lf)) return radiance;
   if (!light.casts_shadows || work.shadows == 0u) return radiance;
   ++shadow_rays;
-  return is_blocked(work.scene.tree, shadow_ray(point, light)) ? dvec3(0.0lf) : radiance;
+  return passed_light(shadow_ray(point, light)) * radiance;
 }
 
 // Light of number `i`: of those that are sampled one by one, then of the others. False where there is none.
@@ -102,12 +104,13 @@ void shade() {
   sum += direct_light(work.views.views[tile_of_pixel().view], point);
   work.states.states[pixel_index].sum += sum;
   if (point.depth == 0u) work.states.states[pixel_index].direct += sum;
-  note_cut_off(false);
+  note_cut_off(coverage_notes.is_unfinished);
 }
 
 void main() {
   start_counts();
   shade();
   atomicAdd(group_counts[kShadowRays], shadow_rays);
+  count_cut_rays();
   add_counts();
 }

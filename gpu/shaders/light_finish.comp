@@ -13,5 +13,5 @@ void main() {
         PointLight(state.sum, state.diffuse, state.direct, state.nearest, state.is_cut_off);
     return;
   }
-  work.pixels.pixels[pixel_index] = vec4(state.sum, state.is_cut_off != 0u ? kUnfinished : float(state.covered));
+  work.pixels.pixels[pixel_index] = vec4(state.sum, state.is_cut_off != 0u ? kUnfinished : state.covered);
 }

@@ -6,11 +6,10 @@
 #include "light_kernel.glsl"
 #include "all_lights.glsl"
 #include "trace.glsl"
+#include "light_rays.glsl"
 
 uint reflection_rays = 0u;
 uint refraction_rays = 0u;
-uint waiting_count = 0u;
-bool is_cut_off = false;
 
 // Follows a lobe by a ray: returns the sky's light that it finds; the surface that it meets waits.
 dvec3 follow(PathVertex point, Bsdf bsdf, uint lobe) {
@@ -29,7 +28,7 @@ dvec3 follow(PathVertex point, Bsdf bsdf, uint lobe) {
   next.origin = ray_origin(point.surface, bounce.direction);
   next.direction = bounce.direction;
   bool meets_backs = leads_into_solid(point.surface, point.material, bounce.direction);
-  next.surface = closest_surface(work.scene.tree, TracedRay(next.origin, next.direction, kInfinity, meets_backs));
+  next.surface = followed_surface(TracedRay(next.origin, next.direction, kInfinity, meets_backs, kNothingPassed), random);
   if (next.surface == kNoSurface) {
     Lights lights = Lights(work.lights);
     double light_pdf = bounce.pdf > 0.0lf ? environment_pdf(lights, point.surface.position,
@@ -44,11 +43,7 @@ dvec3 follow(PathVertex point, Bsdf bsdf, uint lobe) {
   next.previous_pdf = bounce.pdf;
   next.random = random;
   next.depth = point.depth + 1u;
-  if (waiting_count < work.max_waiting) {
-    work.waiting.found[pixel_index * work.max_waiting + waiting_count++] = next;
-  } else {
-    is_cut_off = true;
-  }
+  add_waiting(next);
   return dvec3(0.0lf);
 }
 
@@ -76,7 +71,7 @@ void shade() {
   waiting_count = work.states.states[pixel_index].waiting;
   work.states.states[pixel_index].sum += followed_light(work.states.states[pixel_index].vertex);
   work.states.states[pixel_index].waiting = waiting_count;
-  note_cut_off(is_cut_off);
+  note_cut_off(is_crowded || coverage_notes.is_unfinished);
 }
 
 void main() {
@@ -84,6 +79,7 @@ void main() {
   shade();
   atomicAdd(group_counts[kReflectionRays], reflection_rays);
   atomicAdd(group_counts[kRefractionRays], refraction_rays);
+  count_cut_rays();
   if (waiting_count > 0u) atomicAdd(group_counts[kWaitingPixels], 1u);
   add_counts();
 }

@@ -1,4 +1,8 @@
 // What all kernels that light tiles include.
+
+// Whether the scene has surfaces that cover in part.
+layout(constant_id = 0) const bool kHasCoverage = false;
+
 #include "reals.glsl"
 #include "sampling.glsl"
 #include "sampler.glsl"

@@ -60,7 +60,7 @@ struct PixelState {
   uint waiting;     // vertices on its stack
   uint is_shading;  // whether `vertex` is one that it had
   uint is_cut_off;  // a device ended a loop, or more waited than there is room for
-  uint covered;
+  float covered;
   PathVertex vertex;
 };
 layout(buffer_reference, scalar) buffer PixelStates {
@@ -71,7 +71,8 @@ layout(buffer_reference, scalar) buffer WaitingVertices {
 };
 
 struct LightInput {
-  SceneTrees scene;
+  SceneTrees scene;         // surfaces that cover all behind them
+  SceneTrees alpha_tested;  // the others
   SurfaceTables surfaces;
   Materials materials;
   uint64_t lights;
@@ -112,6 +113,7 @@ layout(push_constant, scalar) uniform Constants {
 const uint kTilePixels = 4096u;
 const uint kTileSide = 64u;
 const float kUnfinished = -1.0;  // no pixel covers so little
+const uint64_t kUnwanted = 0x100000000ul;  // the key of a pixel that is left out
 
 // As they are counted.
 const uint kShadowRays = 0u;
@@ -119,7 +121,8 @@ const uint kReflectionRays = 1u;
 const uint kRefractionRays = 2u;
 const uint kOcclusionRays = 3u;
 const uint kWaitingPixels = 4u;  // that are not done
-const uint kCounters = 5u;
+const uint kCutRays = 5u;        // that ended among too many surfaces
+const uint kCounters = 6u;
 
 LightInput work;
 uint pixel_index;  // among all that are lit together
@@ -150,6 +153,17 @@ uvec2 pixel_in_tile() {
 void add_diffuse_light(uint depth, dvec3 light) {
   work.states.states[pixel_index].sum += light;
   if (depth == 0u) work.states.states[pixel_index].diffuse += light;
+}
+
+uint waiting_count = 0u;  // on the pixel's stack
+bool is_crowded = false;  // whether more would wait than there is room for
+
+void add_waiting(FoundVertex found) {
+  if (waiting_count < work.max_waiting) {
+    work.waiting.found[pixel_index * work.max_waiting + waiting_count++] = found;
+  } else {
+    is_crowded = true;
+  }
 }
 
 // Software devices end all loops of a thread after some turns, in silence.

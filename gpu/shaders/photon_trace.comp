@@ -24,6 +24,6 @@ void main() {
   }
   work.states.states[photon].rays += 1u;
   work.states.states[photon].met =
-      closest_surface(work.scene.tree, TracedRay(flight.origin, flight.direction, kInfinity, true));
+      closest_surface(work.scene.tree, TracedRay(flight.origin, flight.direction, kInfinity, true, kNothingPassed));
   note_cut_off(false);
 }

@@ -29,7 +29,7 @@ void main() {
   uint i = uint(thread_index());
   if (i >= count) return;
   ReadyRay ready = of.rays[i];
-  NearestHit hit = NearestHit(ready.reach, kNoSurface);
-  trace_ray(scene.tree, TracedRay(ready.origin, ready.direction, ready.reach, true), any != 0u, hit);
+  NearestHit hit = NearestHit(ready.reach, kNoSurface, 0u);
+  trace_ray(scene.tree, TracedRay(ready.origin, ready.direction, ready.reach, true, kNothingPassed), any != 0u, hit);
   answers.hits[i] = hit.surface != kNoSurface ? 1u : 0u;
 }

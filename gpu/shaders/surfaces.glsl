@@ -256,9 +256,7 @@ uint layer_of(Placement placed, uint placement, uint triangle, bool inside) {
 }
 
 // The point where the ray meets the triangle's plane, moved onto the triangle.
-SurfacePoint meet_surface(SurfaceTable table, uint surface, dvec3 origin, dvec3 direction) {
-  WorldTriangle triangle = load_triangle(table, surface);
-  Placement placed = table.placements.placements[triangle.placement];
+SurfacePoint meet_loaded(SurfaceTable table, WorldTriangle triangle, Placement placed, dvec3 origin, dvec3 direction) {
   dvec3 from_v0 = origin - triangle.v0;
   dvec3 p = cross(direction, triangle.e2);
   dvec3 q = cross(from_v0, triangle.e1);
@@ -301,11 +299,17 @@ SurfacePoint meet_surface(SurfaceTable table, uint surface, dvec3 origin, dvec3 
                   weights.y * dvec4(placed.colors.vectors[triangle.corners.y]) +
                   weights.z * dvec4(placed.colors.vectors[triangle.corners.z]);
   }
-  point.surface = surface;
+  point.surface = triangle.surface;
   point.material = placed.material;
   point.layer = layer_of(placed, triangle.placement, triangle.index, point.inside);
   point.tangent = dvec3(0.0lf);
   point.bitangent = dvec3(0.0lf);
   if ((placed.traits & kNeedsTangents) != 0u) add_tangents(placed, triangle, weights, point);
   return point;
+}
+
+SurfacePoint meet_surface(SurfaceTable table, uint surface, dvec3 origin, dvec3 direction) {
+  WorldTriangle triangle = load_triangle(table, surface);
+  Placement placed = table.placements.placements[triangle.placement];
+  return meet_loaded(table, triangle, placed, origin, direction);
 }

@@ -1,16 +1,37 @@
 // Rays through a scene: which surface they meet first, and whether they meet any. Needs scene.glsl.
 
+// What a ray has met and passed if it is sent once more from where it began: Passed of rt/trace/ray_scene.h, in metres.
+struct Passed {
+  double distance;
+  uint surface;  // kNoSurface: nothing yet
+  uint first_surface;  // of its instance
+  double edge;  // nearer than that, triangles of one instance are met once: they share the edge there
+};
+const Passed kNothingPassed = Passed(0.0lf, kNoSurface, 0u, 0.0lf);
+
 struct TracedRay {
   dvec3 origin;
   dvec3 direction;   // unit length
   double reach;      // metres
   bool meets_backs;  // of single-sided surfaces
+  Passed passed;
 };
 
 struct NearestHit {
   double distance;  // metres; beyond it nothing matters
   uint surface;     // the lowest one of those at this distance in single precision
+  uint first_surface;  // of its instance
 };
+
+// Whether the ray has that behind it already.
+bool was_met(Passed passed, Instance instance, uint surface, double distance) {
+  if (passed.surface == kNoSurface) return false;
+  if (instance.first_surface == passed.first_surface) {
+    return surface == passed.surface || distance <= passed.distance + passed.edge;
+  }
+  return float(distance) < float(passed.distance) ||
+         (float(distance) == float(passed.distance) && surface < passed.surface);
+}
 
 // See edge_of() in keys.comp: a ray through the edge between two triangles meets both.
 double traced_edge(dvec3 from_v0, dvec3 e1, dvec3 e2, double determinant) {
@@ -38,10 +59,12 @@ void meet_triangle(TracedRay ray, Instance instance, uint triangle, inout Neares
   double edge = traced_edge(from_v0, e1, e2, determinant);
   if (!(u >= -edge && v >= -edge && u + v <= 1.0lf + edge)) return;  // nor where the triangle is seen edge-on
   uint surface = instance.first_surface + triangle;
+  if (was_met(ray.passed, instance, surface, distance)) return;
   bool is_level = float(distance) == float(hit.distance) && hit.surface != kNoSurface;
   if (is_level ? surface < hit.surface : distance < hit.distance) {
     hit.distance = distance;
     hit.surface = surface;
+    hit.first_surface = instance.first_surface;
   }
 }
 
@@ -51,9 +74,15 @@ float traced_limit(NearestHit hit, BoxRay boxes) {
   return float(hit.distance * 1.000001lf - boxes.start);
 }
 
+// Leaves out most of what the ray has passed.
+void start_past(Passed passed, inout BoxRay boxes) {
+  if (passed.surface != kNoSurface) boxes.near = max(float(passed.distance * 0.999999lf - boxes.start), 0.0);
+}
+
 void trace_instance(TracedRay ray, Instance instance, bool any, inout NearestHit hit) {
   BoxRay boxes = make_box_ray(instance.to_boxes * (ray.origin - instance.box_origin),
                               instance.to_boxes * ray.direction, instance.largest);
+  start_past(ray.passed, boxes);
   uint stack[kMaxBvhDepth];
   uint open = 0u;
   uint at = 0u;
@@ -87,6 +116,7 @@ void trace_instance(TracedRay ray, Instance instance, bool any, inout NearestHit
 void trace_ray(SceneTree tree, TracedRay ray, bool any, inout NearestHit hit) {
   if (tree.is_empty != 0u) return;
   BoxRay boxes = make_box_ray(ray.origin - tree.center, ray.direction, tree.largest);
+  start_past(ray.passed, boxes);
   uint stack[kMaxBvhDepth];
   uint open = 0u;
   uint at = 0u;
@@ -112,15 +142,19 @@ void trace_ray(SceneTree tree, TracedRay ray, bool any, inout NearestHit hit) {
   }
 }
 
-// kNoSurface where the ray meets nothing.
-uint closest_surface(SceneTree tree, TracedRay ray) {
-  NearestHit hit = NearestHit(ray.reach, kNoSurface);
+// Its surface is kNoSurface where the ray meets nothing.
+NearestHit closest_hit(SceneTree tree, TracedRay ray) {
+  NearestHit hit = NearestHit(ray.reach, kNoSurface, 0u);
   trace_ray(tree, ray, false, hit);
-  return hit.surface;
+  return hit;
+}
+
+uint closest_surface(SceneTree tree, TracedRay ray) {
+  return closest_hit(tree, ray).surface;
 }
 
 bool is_blocked(SceneTree tree, TracedRay ray) {
-  NearestHit hit = NearestHit(ray.reach, kNoSurface);
+  NearestHit hit = NearestHit(ray.reach, kNoSurface, 0u);
   trace_ray(tree, ray, true, hit);
   return hit.surface != kNoSurface;
 }

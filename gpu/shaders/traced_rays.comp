@@ -31,6 +31,6 @@ void main() {
   uint i = uint(thread_index());
   if (i >= count) return;
   GivenRay traced = of.rays[i];
-  TracedRay ray = TracedRay(traced.origin, traced.direction, traced.reach, traced.meets_backs != 0u);
+  TracedRay ray = TracedRay(traced.origin, traced.direction, traced.reach, traced.meets_backs != 0u, kNothingPassed);
   found.met[i] = uvec2(closest_surface(scene.tree, ray), is_blocked(scene.tree, ray) ? 1u : 0u);
 }
