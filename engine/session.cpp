@@ -191,7 +191,7 @@ bool Session::has_gpu_of_keys() const {
 std::string Session::refusal_of_light(const RaySettings& settings) const {
   if (!gpu_) return "no device was asked for";
   if (std::string refusal = refusal_of_scene(); !refusal.empty()) return refusal;
-  return hpr::refusal_of_light(scene_, settings, plan_passes(requirements_, settings));
+  return hpr::refusal_of_light(scene_, settings);
 }
 
 std::string Session::device_and_driver() const {

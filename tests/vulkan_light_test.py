@@ -20,7 +20,8 @@ OTHERS = 0.0005  # of the pixels may show another surface
 SCENES = ("gen:cornell", "gen:gallery", "gen:sphereflake?s=2", "gen:tetra?s=5", "gen:asteroids", "gen:extensions", "gen:cloud?count=2000")
 KINDS = (("--photons", "0"), ("--photons", "20000"))
 DENOISED = ("--photons", "20000", "--denoise")
-KINDS_OF = {"gen:cornell": (*KINDS, DENOISED), "gen:gallery": (*KINDS, DENOISED), "gen:extensions": (KINDS[0], DENOISED)}  # of others: KINDS
+GATHERED = ("--photons", "20000", "--final-gather")
+KINDS_OF = {"gen:cornell": (*KINDS, DENOISED), "gen:gallery": (*KINDS, DENOISED, GATHERED), "gen:extensions": (KINDS[0], DENOISED)}  # of others: KINDS
 SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "4") for distribution in ("sort-first", "sort-last", "hybrid")]
 
 

@@ -87,7 +87,7 @@ def said_and_done(folder):
     plain = render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned")
     expect(render(folder, "gen:gallery", "--ranks", "2", "--data", "partitioned", "--backend", "vulkan") == plain, "parts of scenes")
     draft = ("--quality", "draft")
-    for settings, reason in (((*draft, "--aov", "albedo"), "further layers"), ((*draft, "--passes", "gather"), "gathering"),
+    for settings, reason in (((*draft, "--aov", "albedo"), "further layers"), ((*draft, "--half-resolution", "shadow"), "half resolution"),
                              ((*draft, "--light-samples", "128"), "light samples")):
         said = hpr(folder, "render", "gen:cornell", "--size", "64x48", "--spp", "1", "-o", "e.exr", "--force", "--backend", "vulkan", "--explain", *settings)
         words = said.stdout + said.stderr

@@ -46,7 +46,7 @@ class GpuLightMeans : public test::OnGpu {
  protected:
   [[nodiscard]] MakeTileShader on_device() {
     return [this](const ShadingInputs& inputs) {
-      EXPECT_EQ(refusal_of_light(inputs.scene, inputs.settings, inputs.plan), "");
+      EXPECT_EQ(refusal_of_light(inputs.scene, inputs.settings), "");
       return std::make_unique<CountingShader>(device(), inputs, tiles_);
     };
   }

@@ -35,8 +35,11 @@ namespace hpr {
 /// As in path.glsl.
 struct GpuPathLimits {
   double glossy_cutoff = 0.0;
+  double near_distance = 0.0;
   std::uint32_t max_depth = 0;
   std::uint32_t followed = 0;
+  std::uint32_t gathers = 0;
+  std::uint32_t padding = 0;
 };
 
 /// As in light_state.glsl.
@@ -71,7 +74,7 @@ struct GpuLightInput {
   std::uint32_t max_waiting = 0;
   std::uint32_t padding = 0;
 };
-static_assert(sizeof(GpuLightInput) == 224);
+static_assert(sizeof(GpuLightInput) == 240);
 static_assert(sizeof(EyePoint) == 80 && sizeof(PointLight) == 80);
 
 namespace {
@@ -100,15 +103,20 @@ struct Constants {
 };
 
 /// As light_state.glsl counts rays; behind them the pixels that are not done, and rays that were cut.
-constexpr std::array kCountedPasses{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion};
+constexpr std::array kCountedPasses{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion,
+                                    PassId::Gather};
 
 constexpr std::size_t kWaitingPixels = kCountedPasses.size();
 constexpr std::size_t kCutRays = kWaitingPixels + 1;
 constexpr std::size_t kCounters = kCutRays + 1;
 
-/// Lit at once: a batch has a time limit, and each pixel has kilobytes of memory while it is lit.
+/// Lit at once on the CPU: a batch has a time limit.
 constexpr std::size_t kSoftwareTiles = 4;
-constexpr std::size_t kTiles = 32;
+/// On a GPU: enough threads for any there is, and few enough for that limit.
+constexpr std::size_t kMinTiles = 4;
+constexpr std::size_t kMaxTiles = 256;
+/// Of a GPU's memory, for what tiles need while they are lit.
+constexpr std::uint64_t kMemoryFraction = 16;
 /// Vertices of each pixel that are shaded before the CPU asks whether all is done.
 constexpr int kRounds = 2;
 constexpr int kMaxLightSamples = 64;
@@ -143,12 +151,18 @@ bool is_finished(std::span<const glm::vec4> pixels) {
   return std::ranges::none_of(pixels, [](const glm::vec4& pixel) { return pixel.a < 0.0F; });
 }
 
-GpuPathLimits limits_of(const ShadingInputs& inputs) {
+/// As in path.glsl.
+constexpr std::uint32_t kGathersByRays = 1;
+constexpr std::uint32_t kGathersPhotons = 2;
+
+GpuPathLimits limits_of(const ShadingInputs& inputs, const PhotonMaps* photons) {
   GpuPathLimits limits{.glossy_cutoff = inputs.settings.glossy_cutoff,
                        .max_depth = static_cast<std::uint32_t>(inputs.settings.max_depth)};
   for (std::size_t lobe = 0; lobe < kLobes.size(); ++lobe) {
     if (inputs.followed_lobes.at(lobe)) limits.followed |= 1U << lobe;
   }
+  if (photons != nullptr) limits.near_distance = photons->near;
+  if (runs_pass(inputs.plan, PassId::Gather)) limits.gathers = photons != nullptr ? kGathersPhotons : kGathersByRays;
   return limits;
 }
 
@@ -176,17 +190,22 @@ void grow_to(const GpuDevice& device, std::optional<GpuBuffer>& buffer, std::siz
 
 }  // namespace
 
-std::string refusal_of_light(const Scene& scene, const RaySettings& settings, std::span<const PassPlan> plan) {
+std::string refusal_of_light(const Scene& scene, const RaySettings& settings) {
   if (settings.show != Show::Shaded) return "what is shown is no light";
   if (settings.reference) return "the reference is the CPU's";
   if (!settings.half_resolution.empty()) return "passes at half resolution are the CPU's";
   if (settings.part) return "rays travel between ranks";
-  if (runs_pass(plan, PassId::Gather)) return "gathering by rays is the CPU's";
   if (settings.light_samples > kMaxLightSamples) {
     return fmt::format("more than {} light samples are the CPU's", kMaxLightSamples);  // a batch has a time limit
   }
   if (std::ranges::any_of(scene.materials, emits_through_coat)) return "emission through clear coats is the CPU's";
   return {};
+}
+
+std::size_t tiles_at_once(const GpuInfo& device, std::size_t tile_bytes) {
+  if (device.software) return kSoftwareTiles;
+  const std::uint64_t fit = device.memory / kMemoryFraction / std::max<std::uint64_t>(tile_bytes, 1);
+  return std::clamp<std::uint64_t>(fit, kMinTiles, kMaxTiles);
 }
 
 GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& inputs, int threads)
@@ -214,6 +233,7 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
   const auto layout = extended ? steps()[Vertex].shader : steps()[Vertex].plain_shader;
   state_bytes_ = array_stride(layout, "PixelState");
   waiting_bytes_ = max_waiting_ * array_stride(layout, "FoundVertex");
+  tiles_at_once_ = tiles_at_once(device.info(), kTilePixels * (state_bytes_ + waiting_bytes_));
   compile();
   if (runs_pass(inputs.plan, PassId::Photon) && refusal_of_photons(inputs.scene).empty()) {
     const GpuPhotonInputs traced{scene_.address(), surfaces_.address(), materials_.address(), lights_.address()};
@@ -255,7 +275,7 @@ void GpuTileShader::put_view(std::size_t i, const View& view, const Media& media
 }
 
 void GpuTileShader::shade(const TilesToShade& lit, RayCounts& counts, const Store& store) {
-  const std::size_t most = device_.info().software ? kSoftwareTiles : kTiles;
+  const std::size_t most = tiles_at_once_;
   if (lit.tiles.empty()) return;
   hold_photons(lit.photons, lit.samples.front().number);
   for (const ShadedSample& sample : lit.samples) {
@@ -323,14 +343,14 @@ bool GpuTileShader::light(const GpuLightInput& input, std::size_t tiles, const s
 }
 
 /// What all light of the scene has in common.
-GpuLightInput GpuTileShader::input_of(bool with_photons) const {
+GpuLightInput GpuTileShader::input_of(const PhotonMaps* photons) const {
   const RaySettings& settings = inputs_.settings;
   GpuLightInput input{.scene = scene_.address(),
                       .alpha_tested = alpha_tested_ ? alpha_tested_->address() : 0,
                       .surfaces = surfaces_.address(),
                       .materials = materials_.address(),
                       .lights = lights_.address(),
-                      .photons = with_photons ? photons_.address() : 0,
+                      .photons = photons != nullptr ? photons_.address() : 0,
                       .tiles = tiles_->address(),
                       .states = states_->address(),
                       .waiting = waiting_->address(),
@@ -339,7 +359,7 @@ GpuLightInput GpuTileShader::input_of(bool with_photons) const {
                       .counters = counters_.address(),
                       .ambient = settings.ambient,
                       .occlusion_reach = occlusion_reach(inputs_.scene),
-                      .limits = limits_of(inputs_),
+                      .limits = limits_of(inputs_, photons),
                       .light_samples = static_cast<std::uint32_t>(settings.light_samples),
                       .occlusion_rays = static_cast<std::uint32_t>(settings.occlusion_rays)};
   input.shadows = runs_pass(inputs_.plan, PassId::Shadow) ? 1 : 0;
@@ -372,7 +392,7 @@ void GpuTileShader::shade_some(const TilesToShade& lit, const ShadedSample& samp
     }
     if (alpha_tested_) counts.primary += wanted_pixels(location.pixels, wanted);
   }
-  GpuLightInput input = input_of(lit.photons != nullptr);
+  GpuLightInput input = input_of(lit.photons);
   input.keys = keys_->address();
   input.pixels = pixels_->address();
   input.random_frame = frame_stream({settings.seed, sample.number.frame});
@@ -406,7 +426,7 @@ void GpuTileShader::shade_points(const PointsToShade& lit, RayCounts& counts) {
       blocks.push_back({&group, first, std::min<std::size_t>(kTilePixels, group.points.size() - first)});
     }
   }
-  const std::size_t most = device_.info().software ? kSoftwareTiles : kTiles;
+  const std::size_t most = tiles_at_once_;
   for (std::size_t first = 0; first < blocks.size(); first += most) {
     if (lit.is_overtaken && lit.is_overtaken()) return;
     shade_blocks(std::span(blocks).subspan(first, std::min(most, blocks.size() - first)), lit, counts);
@@ -427,7 +447,7 @@ void GpuTileShader::shade_blocks(std::span<const PointBlock> blocks, const Point
     std::ranges::copy(block.group->points.subspan(block.first, block.count), points.begin());
     std::ranges::fill(points.subspan(block.count), EyePoint{});
   }
-  GpuLightInput input = input_of(lit.photons != nullptr);
+  GpuLightInput input = input_of(lit.photons);
   input.points = points_->address();
   input.point_lights = point_lights_->address();
   if (!light(input, blocks.size(), lit.is_overtaken, counts)) return;

@@ -49,7 +49,7 @@ class GpuTileShader final : public TileShader {
   [[nodiscard]] bool light(const GpuLightInput& input, std::size_t tiles, const std::function<bool()>& is_overtaken,
                            RayCounts& counts);
   [[nodiscard]] bool follow_paths(std::size_t tiles, bool with_photons, const std::function<bool()>& is_overtaken);
-  [[nodiscard]] GpuLightInput input_of(bool with_photons) const;
+  [[nodiscard]] GpuLightInput input_of(const PhotonMaps* photons) const;
   struct PointBlock;
   void shade_blocks(std::span<const PointBlock> blocks, const PointsToShade& lit, RayCounts& counts);
   void shade_some(const TilesToShade& lit, const ShadedSample& sample, std::span<const std::size_t> tiles,
@@ -69,6 +69,7 @@ class GpuTileShader final : public TileShader {
   std::uint32_t max_waiting_ = 0;                    ///< vertices of a pixel
   std::size_t state_bytes_ = 0;                      ///< of a pixel while it is lit
   std::size_t waiting_bytes_ = 0;                    ///< of the vertices that may wait for it
+  std::size_t tiles_at_once_ = 0;
   GpuBuffer input_;
   GpuBuffer counters_;
   std::optional<GpuBuffer> views_;
@@ -86,8 +87,10 @@ class GpuTileShader final : public TileShader {
   GpuBatch batch_;
 };
 
+/// How many tiles a device lights together, each of which takes so much of its memory meanwhile.
+[[nodiscard]] std::size_t tiles_at_once(const GpuInfo& device, std::size_t tile_bytes);
+
 /// Why a device leaves light to the CPU; empty: it does not.
-[[nodiscard]] std::string refusal_of_light(const Scene& scene, const RaySettings& settings,
-                                           std::span<const PassPlan> plan);
+[[nodiscard]] std::string refusal_of_light(const Scene& scene, const RaySettings& settings);
 
 }  // namespace hpr

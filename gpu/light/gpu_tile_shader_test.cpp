@@ -50,7 +50,7 @@ class GpuTileShaderTest : public test::OnGpu {
     const FrameLayout layout({view.size()});
     TileLayer<Key> keys(layout);
     PrimaryRays(scene, rays, 2).draw(view, 0, std::array{Rect{0, 0, view.size().width, view.size().height}}, keys);
-    EXPECT_EQ(refusal_of_light(scene, settings, plan_passes(requirements, settings)), "");
+    EXPECT_EQ(refusal_of_light(scene, settings), "");
     MakeTileShader make;
     if (by_device) {
       make = [&](const ShadingInputs& inputs) { return std::make_unique<GpuTileShader>(device(), inputs, 2); };
@@ -105,7 +105,8 @@ class GpuTileShaderTest : public test::OnGpu {
     EXPECT_EQ(gpu.by_cpu_ms, 0.0) << "the CPU lit some tiles";
     EXPECT_EQ(gpu.counts.primary, cpu.counts.primary);
     EXPECT_EQ(gpu.counts.cut, cpu.counts.cut);
-    for (const PassId pass : {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion}) {
+    for (const PassId pass :
+         {PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion, PassId::Gather}) {
       const auto traced = static_cast<double>(cpu.counts[pass]);
       EXPECT_NEAR(static_cast<double>(gpu.counts[pass]), traced, 0.01 * traced + 1.0) << static_cast<int>(pass);
     }
@@ -168,6 +169,73 @@ TEST_F(GpuTileShaderTest, GathersPhotonsAndLooksThroughMedia) {
   settings.global_photons = true;
   settings.light_samples = 2;
   expect_as_cpu(scene, settings, view_of(scene, {64, 48}), "room");
+}
+
+/// A floor with a glossy ball, a sign that lights nothing and a roof that the eye does not see, under an even sky.
+Scene square() {
+  Scene scene = test::white_floor();
+  Material polished = test::mirror(0.9F);
+  polished.roughness = 0.2F;
+  Material sign = test::diffuse({0.9F, 0.8F, 0.1F});
+  sign.unlit = true;
+  const std::uint32_t ball = add_mesh(scene, test::sphere(0.6, 12, add_material(scene, polished)));
+  place_mesh(scene, ball, glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.7, 0.0)));
+  place_mesh(scene, add_mesh(scene, quad({-1, 0, -1}, {2, 0, 0}, {0, 1, 0}, add_material(scene, sign))));
+  Material roof = test::diffuse({0.5F, 0.2F, 0.2F});
+  roof.double_sided = false;
+  place_mesh(scene, add_mesh(scene, quad({-1, 2, 1}, {2, 0, 0}, {0, 0, -2}, add_material(scene, roof))));
+  scene.environment = test::even_light({0.4F, 0.6F, 0.8F});
+  finish_scene(scene);
+  return scene;
+}
+
+/// Rays gather all light there is: what meets the sky, signs, lamps and backdrops.
+TEST_F(GpuTileShaderTest, GathersLightAlongRays) {
+  RaySettings best = plain_settings();
+  best.photons = 1'000;
+  best.global_photons = best.gather = true;
+  Scene scene = square();
+  ASSERT_TRUE(runs_pass(plan_passes(requirements_of(scene), best), PassId::Gather));
+  const View view = test::view_from({0.3, 1.5, 3}, {0, 0.4, 0}, {48, 32}, scene, 0.8);
+  expect_as_cpu(scene, best, view, "an even sky");
+  Scene glazed = scene;
+  glazed.materials[0].ior = 1.5F;
+  glazed.materials[0].roughness = 0.1F;
+  finish_scene(glazed);
+  RaySettings denoised = best;
+  denoised.denoise = true;
+  expect_as_cpu(glazed, denoised, view, "denoised", 0.02);
+  RaySettings asked = plain_settings();
+  asked.passes = {PassId::Gather};
+  asked.glossy_cutoff = 0.1;
+  expect_as_cpu(scene, asked, view, "no other pass");
+  Light headlight;
+  headlight.type = LightType::Headlight;
+  scene.lights = {headlight};
+  expect_as_cpu(scene, asked, view, "the headlight");
+  scene.environment.reset();
+  scene.background = {5.0F, 5.0F, 5.0F};
+  Light lamp;
+  lamp.position = {0.5, 1.5, 0.7};
+  lamp.intensity = glm::vec3(20.0F);
+  scene.lights = {lamp};
+  finish_scene(scene);
+  asked.passes = {PassId::Shadow, PassId::Reflection, PassId::Gather};
+  expect_as_cpu(scene, asked, view, "a lamp before a backdrop");
+}
+
+/// Rays gather what photons tell, and leave caustics to them.
+TEST_F(GpuTileShaderTest, GathersWhatPhotonsTell) {
+  RaySettings best = plain_settings();
+  best.photons = 20'000;
+  best.global_photons = best.final_gather = true;
+  best.photons_gathered = 30;
+  Scene room = furnished_room();
+  expect_as_cpu(room, best, view_of(room, {64, 48}), "room");
+  const Scene extensions = load_scene("gen:extensions");
+  expect_as_cpu(extensions, best, view_of(extensions, {64, 48}), "extensions");
+  best.denoise = true;
+  expect_as_cpu(room, best, view_of(room, {64, 48}), "denoised", 0.05);
 }
 
 /// The CPU filters what the device lights: at margins, at edges, and where direct light stays with its pixel.
@@ -341,12 +409,27 @@ TEST_F(GpuTileShaderTest, LeavesToTheCpuWhatItCannotFinish) {
   EXPECT_GT(gpu.by_cpu_ms, 0.0) << "the device finished";
 }
 
+TEST(TilesAtOnce, FitIntoMemory) {
+  constexpr std::size_t kMegabyte = std::size_t{1} << 20U;
+  const auto tiles = [](std::uint64_t megabytes, bool software) {
+    GpuInfo device;
+    device.memory = megabytes * kMegabyte;
+    device.software = software;
+    return tiles_at_once(device, 32 * kMegabyte);
+  };
+  EXPECT_EQ(tiles(80'000, true), 4U);
+  EXPECT_EQ(tiles(80'000, false), 156U);  // 5000 MB of it
+  EXPECT_EQ(tiles(16'384, false), 32U);
+  EXPECT_EQ(tiles(512, false), 4U);
+  EXPECT_EQ(tiles(std::uint64_t{1} << 30U, false), 256U);
+}
+
 TEST(GpuLightRefusals, AreSaid) {
   const Scene plain = load_scene("gen:cornell");
   const auto refusal = [](const Scene& scene, const auto& change) {
     RaySettings settings = plain_settings();
     change(settings);
-    return refusal_of_light(scene, settings, plan_passes(requirements_of(scene), settings));
+    return refusal_of_light(scene, settings);
   };
   const auto nothing = [](RaySettings&) {};
   EXPECT_EQ(refusal(plain, nothing), "");
@@ -355,7 +438,6 @@ TEST(GpuLightRefusals, AreSaid) {
   EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.half_resolution = {PassId::Shadow}; }),
             "passes at half resolution are the CPU's");
   EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.part.emplace(); }), "rays travel between ranks");
-  EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.passes = {PassId::Gather}; }), "gathering by rays is the CPU's");
   EXPECT_EQ(refusal(plain, [](RaySettings& s) { s.light_samples = 65; }), "more than 64 light samples are the CPU's");
   Scene coated = plain;
   MaterialExtensions coat;

@@ -58,8 +58,9 @@ void main() {
     while (next_photon(map, search)) ++found;
     done = done && search_is_done(search);
   } else {
-    light = light_by_photons(photons, surface, query.terms, query.shading_normal, query.gathers != 0u, query.gather_reach,
-                             query.previous_position, query.previous_pdf, done);
+    PhotonUse use = photons_of_path(photons, query.gathers != 0u, query.gather_reach,
+                                    distance(query.position, query.previous_position), query.previous_pdf);
+    light = light_by_photons(photons, use, surface, query.terms, query.shading_normal, done);
   }
   to.answers[uint(i)] = Answer(light, found, done ? 1u : 0u);
 }

@@ -28,9 +28,9 @@ ReflectionTerms gathered_terms(Bsdf bsdf, double glossy_cutoff) {
 }
 
 // As reflect_photons_by_lobes() of rt/photons/photon_query.cpp: by the lobes of a surface with extensions that no ray follows.
-dvec3 gather_by_lobes(PhotonMap map, SurfacePoint surface, Bsdf bsdf, uint lobes, dvec3 shading_normal, inout bool done) {
+dvec3 gather_by_lobes(PhotonMap map, double radius, SurfacePoint surface, Bsdf bsdf, uint lobes, dvec3 shading_normal, inout bool done) {
   const double kGrazing = 1e-3lf;
-  PhotonSearch search = search_photons(map, surface.position, surface.geometric_normal, surface.layer, map.radius);
+  PhotonSearch search = search_photons(map, surface.position, surface.geometric_normal, surface.layer, radius);
   dvec3 sum = dvec3(0.0lf);
   while (next_photon(map, search)) {
     PhotonLight light = map.lights.lights[search.index];
@@ -41,16 +41,15 @@ dvec3 gather_by_lobes(PhotonMap map, SurfacePoint surface, Bsdf bsdf, uint lobes
     sum += (double(search.weight) * cosine) * bsdf_sum(bsdf, lobes, direction) * dvec3(light.flux);
   }
   done = done && search_is_done(search);
-  dvec3 light = photon_density(map, map.radius) * sum;
+  dvec3 light = photon_density(map, radius) * sum;
   return is_finite(light.r + light.g + light.b) ? light : dvec3(0.0lf);
 }
 
-// What photons bring to a surface whose lobes rays follow, but for those that are gathered from photons.
-dvec3 gathered_light(PhotonMaps photons, SurfacePoint surface, Bsdf bsdf, dvec3 shading_normal, double glossy_cutoff,
+// What photons bring to a surface, by the lobes that are not followed for themselves.
+dvec3 gathered_light(PhotonMaps photons, PhotonUse use, SurfacePoint surface, Bsdf bsdf, dvec3 shading_normal, double glossy_cutoff,
                      inout bool done) {
   if (!is_extended(bsdf)) {
-    return light_by_photons(photons, surface, gathered_terms(bsdf, glossy_cutoff), shading_normal, false, kInfinity,
-                            dvec3(0.0lf), 0.0lf, done);
+    return light_by_photons(photons, use, surface, gathered_terms(bsdf, glossy_cutoff), shading_normal, done);
   }
   uint lobes = 0u;
   for (uint lobe = 0u; lobe < kLobes; ++lobe) {
@@ -58,8 +57,10 @@ dvec3 gathered_light(PhotonMaps photons, SurfacePoint surface, Bsdf bsdf, dvec3 
   }
   dvec3 light = dvec3(0.0lf);
   if (lobes == 0u) return light;
-  for (uint which = 0u; which < 2u; ++which) {  // caustic and global ones
-    light += gather_by_lobes(photons.maps[which], surface, bsdf, lobes, shading_normal, done);
+  uint i = 0u;
+  for (; i < use.maps; ++i) {
+    light += gather_by_lobes(photons.maps[i], use.radius[i], surface, bsdf, lobes, shading_normal, done);
   }
+  done = done && i == use.maps;
   return light;
 }

@@ -32,7 +32,7 @@ dvec3 ambient_light(PathVertex point) {
 void shade() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
   PathVertex point = work.states.states[pixel_index].vertex;
-  add_diffuse_light(point.depth, ambient_light(point));
+  add_diffuse_light(point, ambient_light(point));
   note_cut_off(coverage_notes.is_unfinished);
 }
 

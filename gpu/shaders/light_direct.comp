@@ -12,7 +12,8 @@ uint shadow_rays = 0u;
 
 dvec3 emitted_light(PathVertex point, FoundVertex found) {
   Lights lights = Lights(work.lights);
-  if (point.material.emission == dvec3(0.0lf)) return dvec3(0.0lf);
+  if (point.material.emission == dvec3(0.0lf) || (point.reached_by & kCaustic) != 0u) return dvec3(0.0lf);
+  if (point.material.unlit && (point.reached_by & kGathered) != 0u) return dvec3(0.0lf);
   double weight = 1.0lf;
   if (found.previous_pdf > 0.0lf) {
     weight = balance(found.previous_pdf, surface_pdf(lights, found.previous_position, found.previous_normal,
@@ -43,11 +44,17 @@ TracedRay shadow_ray(PathVertex point, LightSample light) {
 // Light of a sample that reaches the pixel, if nothing is between.
 dvec3 sampled_light(PathVertex point, LightSample light) {
   if (light.weight == dvec3(0.0lf)) return dvec3(0.0lf);
+  // The headlight stands at the eye and lights what the eye sees only.
+  if (!light.casts_shadows && (point.reached_by & kGathered) != 0u) return dvec3(0.0lf);
   dvec3 scattered = dvec3(0.0lf);
-  if (light.pdf > 0.0lf) {
+  bool leaves = leaves_caustics(work.limits, point);
+  if (light.pdf > 0.0lf || leaves) {
     Scattering all = bsdf_scattering(point.bsdf, light.to_light);
+    bool may_be_found = light.pdf > 0.0lf && (!gathers_near(point) || light.distance < point.gather_reach);
     for (uint lobe = 0u; lobe < kLobes; ++lobe) {
-      double weight = point.may_follow[lobe] ? 1.0lf - balance(all.pdf[lobe], light.pdf) : 1.0lf;
+      if (leaves && follows_lobe(work.limits, point.bsdf, lobe)) continue;
+      bool is_balanced = may_be_found && point.may_follow[lobe];
+      double weight = is_balanced ? 1.0lf - balance(all.pdf[lobe], light.pdf) : 1.0lf;
       scattered += weight * all.value[lobe];
     }
   } else {
@@ -98,12 +105,11 @@ dvec3 direct_light(View view, inout PathVertex point) {
 void shade() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
   PathVertex point = work.states.states[pixel_index].vertex;
-  // Where it waited, until others do.
-  FoundVertex found = work.waiting.found[pixel_index * work.max_waiting + work.states.states[pixel_index].waiting];
-  dvec3 sum = emitted_light(point, found);
+  dvec3 sum = emitted_light(point, found_vertex());
   sum += direct_light(work.views.views[tile_of_pixel().view], point);
   work.states.states[pixel_index].sum += sum;
   if (point.depth == 0u) work.states.states[pixel_index].direct += sum;
+  if (is_diffuse_path(point)) work.states.states[pixel_index].diffuse += sum;
   note_cut_off(coverage_notes.is_unfinished);
 }
 

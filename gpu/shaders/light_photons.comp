@@ -12,8 +12,11 @@ void main() {
   if (!start_pixel() || work.states.states[pixel_index].is_shading == 0u) return;
   PathVertex point = work.states.states[pixel_index].vertex;
   bool done = true;
-  dvec3 light = gathered_light(PhotonMaps(work.photons), point.surface, point.bsdf, point.material.normal,
-                               work.limits.glossy_cutoff, done);
-  add_diffuse_light(point.depth, point.throughput * light);
+  FoundVertex found = found_vertex();
+  PhotonMaps photons = PhotonMaps(work.photons);
+  PhotonUse use = photons_of_path(photons, work.limits.gathers != 0u, point.gather_reach,
+                                  distance(point.surface.position, found.previous_position), found.previous_pdf);
+  dvec3 light = gathered_light(photons, use, point.surface, point.bsdf, point.material.normal, work.limits.glossy_cutoff, done);
+  add_diffuse_light(point, point.throughput * light);
   note_cut_off(!done);
 }

@@ -22,6 +22,8 @@ FoundVertex first_vertex(uint view, Ray ray, Sampler random) {
   first.random = random;
   first.surface = kNoSurface;
   first.depth = 0u;
+  first.followed = 0u;
+  first.reached_by = 0u;
   return first;
 }
 

@@ -120,9 +120,10 @@ const uint kShadowRays = 0u;
 const uint kReflectionRays = 1u;
 const uint kRefractionRays = 2u;
 const uint kOcclusionRays = 3u;
-const uint kWaitingPixels = 4u;  // that are not done
-const uint kCutRays = 5u;        // that ended among too many surfaces
-const uint kCounters = 6u;
+const uint kGatherRays = 4u;
+const uint kWaitingPixels = 5u;  // that are not done
+const uint kCutRays = 6u;        // that ended among too many surfaces
+const uint kCounters = 7u;
 
 LightInput work;
 uint pixel_index;  // among all that are lit together
@@ -149,10 +150,19 @@ uvec2 pixel_in_tile() {
   return uvec2(pixel_index % kTileSide, pixel_index / kTileSide % kTileSide);
 }
 
-// Adds light that a vertex scatters by lobes which no ray follows.
-void add_diffuse_light(uint depth, dvec3 light) {
+// The vertex that is shaded, as it was found: where it waited, until others do.
+FoundVertex found_vertex() {
+  return work.waiting.found[pixel_index * work.max_waiting + work.states.states[pixel_index].waiting];
+}
+
+bool is_diffuse_path(PathVertex point) {
+  return (point.reached_by & kDiffusePath) != 0u;
+}
+
+// Adds light that a vertex scatters by lobes which no pass follows for itself.
+void add_diffuse_light(PathVertex point, dvec3 light) {
   work.states.states[pixel_index].sum += light;
-  if (depth == 0u) work.states.states[pixel_index].diffuse += light;
+  if (point.depth == 0u || is_diffuse_path(point)) work.states.states[pixel_index].diffuse += light;
 }
 
 uint waiting_count = 0u;  // on the pixel's stack

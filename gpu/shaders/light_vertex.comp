@@ -13,7 +13,7 @@ void main() {
   FoundVertex found = work.waiting.found[pixel_index * work.max_waiting + waiting - 1u];
   PathVertex point = make_vertex(work.surfaces.table, work.materials, work.limits, found);
   work.states.states[pixel_index].vertex = point;
-  if (found.depth == 1u) {
+  if (found.depth == 1u && (found.reached_by & kGathered) == 0u) {
     float metres = float(distance(point.surface.position, found.previous_position));
     work.states.states[pixel_index].nearest = min(work.states.states[pixel_index].nearest, metres);
   }

@@ -209,19 +209,32 @@ double sparse_radius(PhotonMaps photons, double widest, double distance, double 
   return clamp(photons.footprint * distance * narrow, min(photons.maps[1].radius, widest), widest);
 }
 
+// Which maps photons are looked up in, and within how many metres.
+struct PhotonUse {
+  uint maps;  // the first so many
+  double radius[kPhotonMaps];
+};
+
 // As PhotonPass::scatter, of one vertex of a path. `gathers`: whether rays follow all lobes, as far as `gather_reach`.
-dvec3 light_by_photons(PhotonMaps photons, SurfacePoint surface, ReflectionTerms terms, dvec3 shading_normal, bool gathers,
-                       double gather_reach, dvec3 previous_position, double previous_pdf, inout bool done) {
+PhotonUse photons_of_path(PhotonMaps photons, bool gathers, double gather_reach, double distance, double pdf) {
+  PhotonUse use;
   bool gathers_near = is_finite(gather_reach);
-  uint maps = gathers_near ? kPhotonMaps : gathers ? 1u : 2u;
-  double distance_there = distance(surface.position, previous_position);
+  use.maps = gathers_near ? kPhotonMaps : gathers ? 1u : 2u;
+  for (uint i = 0u; i < kPhotonMaps; ++i) {
+    double widest = photons.maps[i].radius;
+    use.radius[i] = i < 2u ? widest : sparse_radius(photons, widest, distance, pdf);
+  }
+  return use;
+}
+
+dvec3 light_by_photons(PhotonMaps photons, PhotonUse use, SurfacePoint surface, ReflectionTerms terms, dvec3 shading_normal,
+                       inout bool done) {
   dvec3 light = dvec3(0.0lf);
   uint i = 0u;
-  for (; i < maps; ++i) {
+  for (; i < use.maps; ++i) {
     PhotonMap map = photons.maps[i];
-    double radius = i < 2u ? map.radius : sparse_radius(photons, map.radius, distance_there, previous_pdf);
-    light += gather_photons(map, radius, surface, terms, shading_normal, done);
+    light += gather_photons(map, use.radius[i], surface, terms, shading_normal, done);
   }
-  done = done && i == maps;
+  done = done && i == use.maps;
   return light;
 }
