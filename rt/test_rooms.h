@@ -82,14 +82,14 @@ inline glm::dvec3 mean_of(const Scene& scene, const View& view, const RaySetting
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     TileLayer<Rgb> radiance(keys.layout());
     shader.shade(std::span(&view, 1), keys, all_tiles(keys.layout()), {.radiance = &radiance}, {.sample = sample});
-    for (int y = 0; y < 16; ++y) {
-      for (int x = 0; x < 16; ++x) {
+    for (int y = 0; y < view.size().height; ++y) {
+      for (int x = 0; x < view.size().width; ++x) {
         const Rgb& color = radiance.at(0, x, y);
         sum += glm::dvec3(color.r, color.g, color.b);
       }
     }
   }
-  return sum / (256.0 * samples);
+  return sum / (static_cast<double>(view.size().area()) * samples);
 }
 
 /// Expects the inverse-square law of a lamp above a white floor.
@@ -141,11 +141,12 @@ inline void expect_no_shadow_on_itself(double scale, double offset, const MakeTi
   EXPECT_GT(lit_pixels, 500);
 }
 
-/// Expects the reference's light in the mean, within 4 %, of a room's photons and rays together.
-inline void expect_light_of_reference(const Scene& scene, const MakeTileShader& make_device = {}) {
+/// Expects the reference's light in the mean, within 4 %, of a room's photons, so many a sample, and rays together.
+inline void expect_light_of_reference(const Scene& scene, std::uint32_t photons = 10'000,
+                                      const MakeTileShader& make_device = {}) {
   const View view = view_from({0, 0, 0.95}, {0, -0.25, -1}, {12, 12}, scene, 1.3);
   const glm::dvec3 reference = mean_of(scene, view, {.max_depth = 32, .terminator_fix = false, .reference = true}, 256);
-  const RaySettings hybrid{.max_depth = 24, .photons = 10'000, .global_photons = true, .terminator_fix = false};
+  const RaySettings hybrid{.max_depth = 24, .photons = photons, .global_photons = true, .terminator_fix = false};
   const glm::dvec3 light = mean_of(scene, view, hybrid, 16, nullptr, make_device);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(light[c] / reference[c], 1.0, 0.04) << "channel " << c;
 }

@@ -199,9 +199,9 @@ inline double mean(const Image<Rgb>& image) {
 
 /// The mean of a pixel over many samples.
 inline glm::dvec3 mean_pixel(const Scene& scene, const View& view, int x, int y, std::uint32_t samples,
-                             const RaySettings& settings = {}, const MakeTileShader& make_device = {}) {
+                             const RaySettings& settings = {}) {
   const TileLayer<Key> keys = cast_keys(scene, std::span(&view, 1));
-  DeferredShader shader(scene, settings, requirements_of(scene), {}, nullptr, make_device);
+  DeferredShader shader(scene, settings);
   glm::dvec3 sum(0.0);
   for (std::uint32_t sample = 0; sample < samples; ++sample) {
     TileLayer<Rgb> radiance(keys.layout());

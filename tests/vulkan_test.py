@@ -8,11 +8,13 @@ Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
 
 import json
 import pathlib
+import subprocess
 import sys
 import tempfile
+import time
 
-from program import expect, failures, run
-from vulkan_program import has_device, hpr, nearly_equal, render
+from program import HPR, expect, failures, run
+from vulkan_program import NO_VULKAN, has_device, hpr, nearly_equal, render
 
 
 def left_open(folder):
@@ -64,16 +66,26 @@ def target_time(folder):
         expect((lit.get("device direct", 0) > 0) == by_device, f"{settings}: the last frame's light: {lit}")
 
 
+def interrupted(folder, settings, state):
+    """A run that ends once it has a checkpoint."""
+    process = subprocess.Popen([HPR, *settings], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=NO_VULKAN if "vulkan" not in settings else None)
+    end = time.monotonic() + 100
+    while not (folder / state).exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.05)
+    process.terminate()
+    process.wait(timeout=60)
+    expect((folder / state).exists(), f"{' '.join(settings)}: left no checkpoint")
+
+
 def resumed(folder):
     """Samples of a device and of the CPU do not mix, whoever chose the device."""
-    settings = ("render", "gen:cornell", "--size", "32x24", "--quality", "draft", "--spp", "2", "-o", "r.exr", "--checkpoint", "r.hpr")
-    hpr(folder, *settings, "--backend", "vulkan")
-    said = hpr(folder, *settings, "--resume", code=2)
-    expect("device" in said.stderr, f"resumed without the device: {said.stderr[-600:]}")
-    hpr(folder, *settings, "--resume", "--backend", "vulkan")
-    hpr(folder, *settings[:-2], "--checkpoint", "c.hpr", "--force")
-    said = hpr(folder, *settings[:-2], "--checkpoint", "c.hpr", "--resume", "--backend", "vulkan", code=2)
-    expect("device" in said.stderr, f"resumed with a device: {said.stderr[-600:]}")
+    by_device = ("--backend", "vulkan")
+    for name, first, then in (("by-device", by_device, ()), ("by-cpu", (), by_device)):
+        settings = ("render", "gen:cornell", "--size", "32x24", "--quality", "draft", "--spp", "100000", "-o", f"{name}.exr", "--checkpoint", f"{name}.hpr",
+                    "--checkpoint-every", "0.1s")
+        interrupted(folder, (*settings, *first), f"{name}.hpr")
+        said = hpr(folder, *settings, "--resume", *then, code=3)
+        expect("device" in said.stderr, f"{name}: resumed with {then}: {said.stderr[-600:]}")
 
 
 def said_and_done(folder):

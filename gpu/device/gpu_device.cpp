@@ -7,12 +7,14 @@
 #include <array>
 #include <atomic>
 #include <cstring>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "core/error.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "gpu/device/gpu_kernel.h"
 
 namespace hpr {
 namespace {
@@ -331,12 +333,21 @@ GpuDevice::GpuDevice(const GpuOptions& options, const Choose& choose)
 }
 
 GpuDevice::~GpuDevice() {
+  kernels_.clear();
   if (given_up_) {
     (void)instance_.release();
     (void)functions_.release();
     return;
   }
   if (device_ != VK_NULL_HANDLE) vk_->DestroyDevice(device_, nullptr);
+}
+
+const GpuKernel& GpuDevice::kernel(std::span<const std::uint32_t> spirv, std::size_t constants,
+                                   std::uint32_t variant) const {
+  std::unique_ptr<const GpuKernel>& kept = kernels_[{spirv.data(), variant}];
+  if (!kept) kept = std::make_unique<GpuKernel>(*this, spirv, constants, variant);
+  HPR_CHECK(kept->constants() == constants);
+  return *kept;
 }
 
 std::shared_ptr<const std::atomic<std::uint64_t>> GpuDevice::validation_errors() const {

@@ -6,9 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "gpu/device/vulkan_functions.h"
@@ -44,6 +47,8 @@ struct GpuOptions {
 /// there is none that can do hpr's work; Usage for an index there is not.
 [[nodiscard]] GpuInfo choose_gpu(const std::vector<GpuInfo>& gpus, const GpuOptions& options);
 
+class GpuKernel;
+
 /// A device with one queue for all that is done on it. It outlives its buffers, kernels and batches; one thread uses
 /// it at a time.
 class GpuDevice {
@@ -72,6 +77,11 @@ class GpuDevice {
   [[nodiscard]] double timestamp_ns() const { return timestamp_ns_; }             ///< of one tick; 0: it has no clock
   [[nodiscard]] std::uint64_t timestamp_mask() const { return timestamp_mask_; }  ///< of the bits that count
   [[nodiscard]] std::chrono::seconds limit() const { return limit_; }
+
+  /// As GpuKernel's constructor makes it of a shader that stays where it is; made once, and kept as long as the device:
+  /// whoever lights by other settings need not wait for it again.
+  [[nodiscard]] const GpuKernel& kernel(std::span<const std::uint32_t> spirv, std::size_t constants,
+                                        std::uint32_t variant = 0) const;
 
   /// The first memory type of those in `types` that has all of `wanted`; -1: none.
   [[nodiscard]] int memory_type(std::uint32_t types, VkMemoryPropertyFlags wanted) const;
@@ -104,6 +114,7 @@ class GpuDevice {
   std::chrono::seconds limit_;
   VkPhysicalDeviceMemoryProperties memory_{};
   mutable bool given_up_ = false;
+  mutable std::map<std::pair<const std::uint32_t*, std::uint32_t>, std::unique_ptr<const GpuKernel>> kernels_;
 };
 
 }  // namespace hpr

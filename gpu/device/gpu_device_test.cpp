@@ -137,6 +137,13 @@ TEST_F(GpuWork, MoreGroupsThanGoInARowAreRun) {
   EXPECT_TRUE(std::ranges::all_of(numbers.mapped<const std::uint64_t>(), [](std::uint64_t n) { return n == 3; }));
 }
 
+TEST_F(GpuWork, KernelsAreMadeOnce) {
+  const GpuKernel& add = device().kernel(add_numbers, sizeof(Added));
+  EXPECT_EQ(&device().kernel(add_numbers, sizeof(Added)), &add);
+  EXPECT_NE(&device().kernel(add_numbers, sizeof(Added), 1), &add);
+  EXPECT_NE(&device().kernel(count_until_odd, sizeof(std::uint64_t)), &add);
+}
+
 TEST_F(GpuWork, MemoryThatIsNotThereIsALimit) {
   try {
     const GpuBuffer huge(device(), device().info().memory + (std::size_t{1} << 20U), GpuMemory::Device);

@@ -85,16 +85,11 @@ TEST_F(GpuLightMeans, ABallOfHalfGlassInAFurnaceGivesBackNoMoreThanArrives) {
 }
 
 TEST_F(GpuLightMeans, PhotonsInAClosedBoxAreAsBrightAsItsSeriesSums) {
-  test::expect_light_of_series(0.8, {.photons = 50'000, .global_photons = true}, 16, on_device());
+  test::expect_light_of_series(0.8, {.photons = 20'000, .global_photons = true}, 8, on_device());
 }
 
 TEST_F(GpuLightMeans, PhotonsAndRaysBringTheLightOfPaths) {
-  Material rough = test::mirror(0.9F);
-  rough.roughness = 0.6F;
-  for (const Material& thing : {rough, test::clear_glass(1.5F, 1.0F)}) {
-    SCOPED_TRACE(thing.metallic + thing.roughness);
-    test::expect_light_of_reference(test::room(thing, false), on_device());
-  }
+  test::expect_light_of_reference(test::room(test::clear_glass(1.5F, 1.0F), false), 7'000, on_device());
 }
 
 TEST_F(GpuLightMeans, APointLightOverAWhitePlaneGivesTheAnalyticRadiance) {

@@ -130,7 +130,7 @@ GpuPhotonTracer::GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs&
       batch_(device) {
   for (const StepInfo& step : steps()) {
     const auto shader = extended ? step.shader : step.plain_shader;
-    kernels_.push_back(std::make_unique<GpuKernel>(device, shader, sizeof(Constants)));
+    kernels_.push_back(&device.kernel(shader, sizeof(Constants)));
     times_.push_back({std::string(step.name), 0.0});
   }
   const auto layout = extended ? steps()[Scatter].shader : steps()[Scatter].plain_shader;
@@ -142,7 +142,7 @@ GpuPhotonTracer::GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs&
 /// Each for itself, as waits have a limit.
 void GpuPhotonTracer::compile() {
   if (!device_.info().software) return;
-  for (const auto& kernel : kernels_) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
+  for (const GpuKernel* kernel : kernels_) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
 }
 
 std::vector<PassTime> GpuPhotonTracer::take_times() {

@@ -50,11 +50,11 @@ class GpuPhotonTracer final : public PhotonDevice {
 
   const GpuDevice& device_;
   GpuPhotonInputs inputs_;
-  std::vector<std::unique_ptr<GpuKernel>> kernels_;  ///< by step
-  std::vector<PassTime> times_;                      ///< by step
-  std::size_t state_bytes_ = 0;                      ///< of a photon while it is traced
-  std::size_t flight_bytes_ = 0;                     ///< of one of its flights
-  std::size_t photons_ = 0;                          ///< traced at once
+  std::vector<const GpuKernel*> kernels_;  ///< by step
+  std::vector<PassTime> times_;            ///< by step
+  std::size_t state_bytes_ = 0;            ///< of a photon while it is traced
+  std::size_t flight_bytes_ = 0;           ///< of one of its flights
+  std::size_t photons_ = 0;                ///< traced at once
   GpuBuffer input_;
   std::optional<GpuBuffer> states_;
   std::optional<GpuBuffer> flights_;

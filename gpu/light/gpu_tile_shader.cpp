@@ -227,7 +227,7 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
     const auto shader = extended ? step.shader : step.plain_shader;
     const bool runs = !step.pass || runs_pass(inputs.plan, *step.pass);
     const std::uint32_t has_coverage = alpha_tested_ ? 1 : 0;
-    kernels_.push_back(runs ? std::make_unique<GpuKernel>(device, shader, sizeof(Constants), has_coverage) : nullptr);
+    kernels_.push_back(runs ? &device.kernel(shader, sizeof(Constants), has_coverage) : nullptr);
     times_.push_back({std::string(step.name), 0.0, step.pass});
   }
   const auto layout = extended ? steps()[Vertex].shader : steps()[Vertex].plain_shader;
@@ -244,8 +244,8 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
 /// Each for itself, as waits have a limit.
 void GpuTileShader::compile() {
   if (!device_.info().software) return;
-  for (const auto& kernel : kernels_) {
-    if (kernel) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
+  for (const GpuKernel* kernel : kernels_) {
+    if (kernel != nullptr) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
   }
 }
 
@@ -288,7 +288,7 @@ void GpuTileShader::shade(const TilesToShade& lit, RayCounts& counts, const Stor
 
 /// Where its pass runs.
 void GpuTileShader::run_step(std::size_t step, std::size_t tiles) {
-  if (!kernels_[step]) return;
+  if (kernels_[step] == nullptr) return;
   batch_.begin_pass(times_[step].name);
   batch_.run(*kernels_[step], tiles * kTilePixels, Constants{input_.address(), static_cast<std::uint32_t>(tiles), 0});
 }

@@ -63,12 +63,12 @@ class GpuTileShader final : public TileShader {
   GpuMaterials materials_;
   GpuLights lights_;
   GpuPhotons photons_;
-  std::optional<SampleNumber> held_photons_ = {};    ///< the sample whose photons those are
-  std::vector<std::unique_ptr<GpuKernel>> kernels_;  ///< by step; null where its pass does not run
-  std::vector<PassTime> times_;                      ///< by step
-  std::uint32_t max_waiting_ = 0;                    ///< vertices of a pixel
-  std::size_t state_bytes_ = 0;                      ///< of a pixel while it is lit
-  std::size_t waiting_bytes_ = 0;                    ///< of the vertices that may wait for it
+  std::optional<SampleNumber> held_photons_ = {};  ///< the sample whose photons those are
+  std::vector<const GpuKernel*> kernels_;          ///< by step; null where its pass does not run
+  std::vector<PassTime> times_;                    ///< by step
+  std::uint32_t max_waiting_ = 0;                  ///< vertices of a pixel
+  std::size_t state_bytes_ = 0;                    ///< of a pixel while it is lit
+  std::size_t waiting_bytes_ = 0;                  ///< of the vertices that may wait for it
   std::size_t tiles_at_once_ = 0;
   GpuBuffer input_;
   GpuBuffer counters_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "rt/photons/photon_tracer.h"
+#include "rt/test_rooms.h"
 #include "rt/test_scene.h"
 
 /// Rooms and photon sources for tests, without LightSampler.
@@ -68,7 +69,7 @@ inline void expect_light_of_series(double albedo, const RaySettings& settings, s
                                    const MakeTileShader& make_device = {}) {
   const Scene scene = furnace(static_cast<float>(albedo), 1.0F);
   const View view = view_from({0, 0, 0.5}, {0.1, 0.2, -1}, {8, 8}, scene, 0.5);
-  const glm::dvec3 mean = mean_pixel(scene, view, 4, 4, samples, settings, make_device);
+  const glm::dvec3 mean = mean_of(scene, view, settings, samples, nullptr, make_device);
   EXPECT_NEAR(mean.g * (1.0 - albedo), 1.0, 0.02) << "albedo " << albedo;
 }
 
