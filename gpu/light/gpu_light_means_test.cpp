@@ -85,7 +85,7 @@ TEST_F(GpuLightMeans, ABallOfHalfGlassInAFurnaceGivesBackNoMoreThanArrives) {
 }
 
 TEST_F(GpuLightMeans, PhotonsInAClosedBoxAreAsBrightAsItsSeriesSums) {
-  test::expect_light_of_series(0.8, {.photons = 20'000, .global_photons = true}, 8, on_device());
+  test::expect_light_of_series(0.8, {.photons = 20'000, .global_photons = true}, 4, on_device());
 }
 
 TEST_F(GpuLightMeans, PhotonsAndRaysBringTheLightOfPaths) {
