@@ -25,7 +25,7 @@ PLAIN = ("--photons", "0")
 DENOISED = (*PHOTONS, "--denoise")
 GATHERED = (*PHOTONS, "--final-gather")
 KINDS = (PLAIN, PHOTONS, DENOISED, GATHERED)
-KINDS_OF = {"gen:cornell": (PLAIN, PHOTONS), "gen:gallery": (PHOTONS, DENOISED), "gen:extensions": (DENOISED,)}  # of others: PHOTONS
+KINDS_OF = {"gen:cornell": (PLAIN,), "gen:gallery": (PHOTONS, DENOISED), "gen:sphereflake?s=2": (PLAIN,)}  # of others: PHOTONS
 SPREADS = [("--ranks", ranks, "--distribute", distribution) for ranks in ("2", "4") for distribution in ("sort-first", "sort-last", "hybrid")]
 
 
