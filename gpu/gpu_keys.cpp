@@ -28,7 +28,7 @@ struct Constants {
 
 GpuKeys::GpuKeys(const GpuDevice& device)
     : device_(device),
-      kernel_(device, keys, sizeof(Constants)),
+      kernel_(device.kernel(keys, sizeof(Constants))),
       view_(device, sizeof(GpuView), GpuMemory::Upload),
       batch_(device) {}
 

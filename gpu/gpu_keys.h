@@ -34,7 +34,7 @@ class GpuKeys {
   void draw_band(const GpuScene& scene, const View& band, std::span<Key> pixels);
 
   const GpuDevice& device_;
-  GpuKernel kernel_;
+  const GpuKernel& kernel_;
   GpuBuffer view_;
   std::optional<GpuBuffer> keys_;
   std::optional<GpuBuffer> read_;

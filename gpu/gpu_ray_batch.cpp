@@ -44,7 +44,7 @@ GpuRayBatch::GpuRayBatch(const GpuDevice& device, const GpuScene& scene, std::sp
     : device_(device),
       scene_(scene),
       count_(rays.size()),
-      kernel_(device, ray_rates, sizeof(Constants)),
+      kernel_(device.kernel(ray_rates, sizeof(Constants))),
       rays_(device, std::max<std::size_t>(rays.size_bytes(), 1), GpuMemory::Device),
       answers_(device, std::max<std::size_t>(rays.size(), 1) * sizeof(std::uint32_t), GpuMemory::Device),
       batch_(device) {

@@ -46,7 +46,7 @@ class GpuRayBatch {
   const GpuDevice& device_;
   const GpuScene& scene_;
   std::size_t count_;
-  GpuKernel kernel_;
+  const GpuKernel& kernel_;
   GpuBuffer rays_;
   GpuBuffer answers_;
   GpuBatch batch_;

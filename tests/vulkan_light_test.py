@@ -8,14 +8,12 @@ Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
 """
 
 import json
-import pathlib
 import struct
 import sys
-import tempfile
 
-from program import expect, failures
+from program import expect
 from quads import Quads
-from vulkan_program import SIZE, has_device, hpr, nearly_equal, render
+from vulkan_program import SIZE, hpr, nearly_equal, render, run_parts
 
 EVERYTHING = "--all" in sys.argv
 OTHERS = 0.0005  # of the pixels may show another surface
@@ -125,17 +123,5 @@ def spreads(folder):
             expect(found == alone, f"other bits with {' '.join(kind + spread)} and {photons} photons")
 
 
-def main():
-    with tempfile.TemporaryDirectory(prefix="hpr-vulkan-") as scratch:
-        folder = pathlib.Path(scratch)
-        if not has_device(folder):
-            print("Vulkan has no device here that can do hpr's work")
-            return 77
-        pictures_of_scenes(folder)
-        pictures_of_veils(folder)
-        spreads(folder)
-    return 1 if failures else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_parts(pictures_of_scenes, pictures_of_veils, spreads))

@@ -2,8 +2,10 @@
 
 import json
 import os
+import pathlib
+import tempfile
 
-from program import expect, run
+from program import expect, failures, run
 
 # What devices are compared with is the CPU's and OpenGL's, on machines with a GPU as well.
 NO_VULKAN = {**os.environ, "VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
@@ -33,3 +35,15 @@ def nearly_equal(folder, expected, found, what, allowed=1e-5):
     diff = json.loads(run(folder, "diff", expected, found, "--json").stdout)
     expect(diff["relmse_untrimmed"] <= allowed and diff["not_finite"] == 0, f"{what}: relMSE {diff['relmse_untrimmed']}")
     expect(diff["differing"] <= OTHERS_LIT * diff["pixels"] or diff["max"] < 1e-3, f"{what}: {diff['differing']} pixels differ")
+
+
+def run_parts(*parts):
+    """A test's exit code: each part is called with a folder to write to."""
+    with tempfile.TemporaryDirectory(prefix="hpr-vulkan-") as scratch:
+        folder = pathlib.Path(scratch)
+        if not has_device(folder):
+            print("Vulkan has no device here that can do hpr's work")
+            return 77
+        for part in parts:
+            part(folder)
+    return 1 if failures else 0

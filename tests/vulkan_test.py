@@ -7,14 +7,12 @@ Prints what was wrong and leaves with 1; with 77 where Vulkan has no device.
 """
 
 import json
-import pathlib
 import subprocess
 import sys
-import tempfile
 import time
 
-from program import HPR, expect, failures, run
-from vulkan_program import NO_VULKAN, has_device, hpr, nearly_equal, render
+from program import HPR, expect, run
+from vulkan_program import NO_VULKAN, hpr, nearly_equal, render, run_parts
 
 
 def left_open(folder):
@@ -120,19 +118,5 @@ def said_and_done(folder):
     expect((folder / "wall" / "wall.png").exists(), "a wall has no picture")
 
 
-def main():
-    with tempfile.TemporaryDirectory(prefix="hpr-vulkan-") as scratch:
-        folder = pathlib.Path(scratch)
-        if not has_device(folder):
-            print("Vulkan has no device here that can do hpr's work")
-            return 77
-        left_open(folder)
-        device_row(folder)
-        target_time(folder)
-        resumed(folder)
-        said_and_done(folder)
-    return 1 if failures else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_parts(left_open, device_row, target_time, resumed, said_and_done))

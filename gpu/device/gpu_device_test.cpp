@@ -154,67 +154,75 @@ TEST_F(GpuWork, MemoryThatIsNotThereIsALimit) {
   }
 }
 
-TEST(GpuErrors, WorkThatDoesNotEndIsGivenUpAndMayBeWaitedForAgain) {
-  const int which = test::usable_gpu(true);  // a GPU's watchdog would end it, and need not see what the CPU writes
-  if (which < 0) GTEST_SKIP() << "no device on the CPU";
-  GpuDevice device({.device = which, .limit = std::chrono::seconds(2)});
-  const GpuBuffer number(device, 4, GpuMemory::Readback);
-  number.mapped<std::uint32_t>()[0] = 0;
-  const GpuKernel endless(device, count_until_odd, sizeof(std::uint64_t));
-  GpuBatch batch(device);
-  // Software devices end each thread's loops after 65 535 turns: only many threads take long.
-  batch.run(endless, std::uint64_t{1} << 22U, number.address());
-  batch.submit();
-  const auto code = [&] {
+/// Work of a device on the CPU that takes until it is told to end.
+class EndlessWork {
+ public:
+  explicit EndlessWork(const GpuDevice& device)
+      : number_(device, 4, GpuMemory::Readback),
+        kernel_(device, count_until_odd, sizeof(std::uint64_t)),
+        batch_(std::make_unique<GpuBatch>(device)) {
+    number_.mapped<std::uint32_t>()[0] = 0;
+    // Software devices end each thread's loops after 65 535 turns: only many threads take long.
+    batch_->run(kernel_, std::uint64_t{1} << 22U, number_.address());
+    batch_->submit();
+  }
+  ExitCode wait(int limits = 1) {
     try {
-      batch.wait();
+      batch_->wait(limits);
       return ExitCode::Done;
     } catch (const Error& error) {
       return error.code();
     }
-  };
-  EXPECT_EQ(code(), ExitCode::Hang);
-  __atomic_fetch_or(&number.mapped<std::uint32_t>()[0], 1U, __ATOMIC_RELAXED);
-  EXPECT_EQ(code(), ExitCode::Done);
+  }
+  void end() { __atomic_fetch_or(&number_.mapped<std::uint32_t>()[0], 1U, __ATOMIC_RELAXED); }
+  void leave() { batch_.reset(); }
+
+ private:
+  GpuBuffer number_;
+  GpuKernel kernel_;
+  std::unique_ptr<GpuBatch> batch_;
+};
+
+/// On a device on the CPU: a GPU's watchdog would end such work, and need not see what the CPU writes.
+class GpuErrors : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (test::usable_gpu(true) < 0) GTEST_SKIP() << "no device on the CPU";
+  }
+  static GpuOptions with_limit(int seconds) {
+    return {.device = test::usable_gpu(true), .limit = std::chrono::seconds(seconds)};
+  }
+};
+
+TEST_F(GpuErrors, WorkThatDoesNotEndIsGivenUpAndMayBeWaitedForAgain) {
+  const GpuDevice device(with_limit(2));
+  EndlessWork work(device);
+  EXPECT_EQ(work.wait(), ExitCode::Hang);
+  work.end();
+  EXPECT_EQ(work.wait(), ExitCode::Done);
 }
 
-TEST(GpuErrors, WorkMayBeWaitedForLongerThanTheLimit) {
-  const int which = test::usable_gpu(true);
-  if (which < 0) GTEST_SKIP() << "no device on the CPU";
-  const GpuDevice device({.device = which, .limit = std::chrono::seconds(1)});
-  const GpuBuffer number(device, 4, GpuMemory::Readback);
-  number.mapped<std::uint32_t>()[0] = 0;
-  const GpuKernel endless(device, count_until_odd, sizeof(std::uint64_t));
-  GpuBatch batch(device);
-  batch.run(endless, std::uint64_t{1} << 22U, number.address());
-  batch.submit();
+TEST_F(GpuErrors, WorkMayBeWaitedForLongerThanTheLimit) {
+  const GpuDevice device(with_limit(1));
+  EndlessWork work(device);
   std::thread ends([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(1300));
-    __atomic_fetch_or(&number.mapped<std::uint32_t>()[0], 1U, __ATOMIC_RELAXED);
+    work.end();
   });
-  EXPECT_NO_THROW(batch.wait(60));
+  EXPECT_EQ(work.wait(60), ExitCode::Done);
   ends.join();
 }
 
-TEST(GpuErrors, ADeviceWhoseWorkDoesNotEndIsLeftAsItIs) {
-  const int which = test::usable_gpu(true);
-  if (which < 0) GTEST_SKIP() << "no device on the CPU";
-  const auto device = std::make_unique<GpuDevice>(GpuOptions{.device = which, .limit = std::chrono::seconds(1)});
-  const GpuBuffer number(*device, 4, GpuMemory::Readback);
-  std::uint32_t& counted = number.mapped<std::uint32_t>()[0];
-  counted = 0;
-  {
-    const GpuKernel endless(*device, count_until_odd, sizeof(std::uint64_t));
-    GpuBatch batch(*device);
-    batch.run(endless, std::uint64_t{1} << 22U, number.address());
-    batch.submit();
-    EXPECT_THROW(batch.wait(), Error);
-  }
+TEST_F(GpuErrors, ADeviceWhoseWorkDoesNotEndIsLeftAsItIs) {
+  const auto device = std::make_unique<GpuDevice>(with_limit(1));
+  EndlessWork work(*device);
+  EXPECT_EQ(work.wait(), ExitCode::Hang);
+  work.leave();
   EXPECT_TRUE(device->is_given_up());
-  __atomic_fetch_or(&counted, 1U, __ATOMIC_RELAXED);  // ends at last
+  work.end();
 }
 
-TEST(GpuErrors, ADeviceThatIsLostOrSilentIsNamed) {
+TEST(GpuErrorCodes, ADeviceThatIsLostOrSilentIsNamed) {
   if (test::usable_gpu() < 0) GTEST_SKIP() << "no device that Vulkan can compute on";
   const GpuDevice device({.software = true});
   struct Case {

@@ -14,11 +14,9 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
-#include <string_view>
 #include <utility>
 
 #include "core/error.h"
-#include "core/job_board.h"
 #include "scene/requirements.h"
 
 namespace hpr {
@@ -61,12 +59,6 @@ static_assert(sizeof(GpuKeptPhoton) == 40);
 constexpr std::uint32_t kNotKept = 0;
 constexpr std::uint32_t kKeptCaustic = 1;
 
-struct Constants {
-  std::uint64_t input;
-  std::uint32_t live_count;
-  std::uint32_t round;
-};
-
 /// Traced at once: a batch has a time limit, and each photon has kilobytes of memory while it is traced.
 constexpr std::size_t kSoftwarePhotons = 8192;
 constexpr std::size_t kDevicePhotons = 65536;
@@ -80,14 +72,8 @@ constexpr std::size_t kFirstRounds = 2;
 /// The steps of photons; those from the second on are repeated.
 enum Step : std::size_t { Start, Trace, Arrive, Directions, Scatter };
 
-struct StepInfo {
-  std::string_view name;
-  std::span<const std::uint32_t> shader;
-  std::span<const std::uint32_t> plain_shader;  ///< for scenes without extensions of materials
-};
-
 /// By step.
-std::array<StepInfo, 5> steps() {
+std::array<GpuStep, 5> steps() {
   return {{{"device photon start", photon_start, photon_start_plain},
            {"device photon trace", photon_trace, photon_trace_plain},
            {"device photon arrive", photon_arrive, photon_arrive_plain},
@@ -127,43 +113,16 @@ GpuPhotonTracer::GpuPhotonTracer(const GpuDevice& device, const GpuPhotonInputs&
       inputs_(inputs),
       photons_(device.info().software ? kSoftwarePhotons : kDevicePhotons),
       input_(device, sizeof(GpuPhotonInput), GpuMemory::Upload),
-      batch_(device) {
-  for (const StepInfo& step : steps()) {
-    const auto shader = extended ? step.shader : step.plain_shader;
-    kernels_.push_back(&device.kernel(shader, sizeof(Constants)));
-    times_.push_back({std::string(step.name), 0.0});
-  }
+      steps_(device, steps(), {.extended = extended, .input = input_.address()}) {
   const auto layout = extended ? steps()[Scatter].shader : steps()[Scatter].plain_shader;
   state_bytes_ = array_stride(layout, "PhotonState");
   flight_bytes_ = array_stride(layout, "PhotonFlight");
-  compile();
-}
-
-/// Each for itself, as waits have a limit.
-void GpuPhotonTracer::compile() {
-  if (!device_.info().software) return;
-  for (const GpuKernel* kernel : kernels_) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
 }
 
 std::vector<PassTime> GpuPhotonTracer::take_times() {
-  std::vector<PassTime> times = times_;
-  for (PassTime& step : times_) step.ms = 0.0;
+  std::vector<PassTime> times(steps_.times().begin(), steps_.times().end());
+  steps_.clear_times();
   return times;
-}
-
-void GpuPhotonTracer::run_step(std::size_t step, std::size_t threads, std::uint32_t round) {
-  batch_.begin_pass(times_[step].name);
-  batch_.run(*kernels_[step], threads, Constants{input_.address(), static_cast<std::uint32_t>(threads), round});
-}
-
-void GpuPhotonTracer::finish_batch() {
-  batch_.submit();
-  batch_.wait();
-  report_step();
-  for (const GpuPassTime& time : batch_.times()) {
-    const auto step = std::ranges::find(times_, time.pass, &PassTime::name);
-    if (step != times_.end()) step->ms += time.ms;
-  }
 }
 
 void GpuPhotonTracer::grow() {
@@ -234,14 +193,14 @@ DevicePhotons GpuPhotonTracer::trace(const PhotonsToTrace& wanted) {
     std::ranges::copy(piece.live, live_->mapped<std::uint32_t>().begin());
     const std::size_t count = piece.live.size();
     const std::size_t rounds = std::min(kFirstRounds * photons_ / count, kMaxRounds);
-    if (starts) run_step(Start, count, 0);
+    if (starts) steps_.run(Start, count, count);
     for (std::size_t round = 0; round < rounds; ++round) {
       for (const Step step : {Trace, Arrive, Directions, Scatter}) {
-        run_step(step, count, static_cast<std::uint32_t>(round));
+        steps_.run(step, count, count, static_cast<std::uint32_t>(round));
       }
     }
-    batch_.copy(*kept_, *read_, rounds * count * sizeof(GpuKeptPhoton));
-    finish_batch();
+    steps_.batch().copy(*kept_, *read_, rounds * count * sizeof(GpuKeptPhoton));
+    steps_.finish();
     read_rounds(rounds, piece);
   }
   piece.sort();

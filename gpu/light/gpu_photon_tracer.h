@@ -9,11 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "gpu/device/gpu_batch.h"
 #include "gpu/device/gpu_buffer.h"
 #include "gpu/device/gpu_device.h"
-#include "gpu/device/gpu_kernel.h"
-#include "rt/lights/light_sampler.h"
+#include "gpu/light/gpu_steps.h"
 #include "rt/photons/photon_tracer.h"
 #include "scene/scene.h"
 
@@ -41,20 +39,15 @@ class GpuPhotonTracer final : public PhotonDevice {
  private:
   struct Piece;
 
-  void compile();
-  void run_step(std::size_t step, std::size_t threads, std::uint32_t round);
-  void finish_batch();
   void grow();
   void write_input(const PhotonsToTrace& wanted);
   void read_rounds(std::size_t rounds, Piece& piece) const;
 
   const GpuDevice& device_;
   GpuPhotonInputs inputs_;
-  std::vector<const GpuKernel*> kernels_;  ///< by step
-  std::vector<PassTime> times_;            ///< by step
-  std::size_t state_bytes_ = 0;            ///< of a photon while it is traced
-  std::size_t flight_bytes_ = 0;           ///< of one of its flights
-  std::size_t photons_ = 0;                ///< traced at once
+  std::size_t state_bytes_ = 0;   ///< of a photon while it is traced
+  std::size_t flight_bytes_ = 0;  ///< of one of its flights
+  std::size_t photons_ = 0;       ///< traced at once
   GpuBuffer input_;
   std::optional<GpuBuffer> states_;
   std::optional<GpuBuffer> flights_;
@@ -62,7 +55,7 @@ class GpuPhotonTracer final : public PhotonDevice {
   std::optional<GpuBuffer> kept_;
   std::optional<GpuBuffer> read_;
   std::optional<GpuBuffer> statuses_;
-  GpuBatch batch_;
+  GpuSteps steps_;
 };
 
 /// Why a device leaves the photons of a scene to the CPU; empty: it does not.

@@ -21,10 +21,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
-#include <string_view>
 
 #include "core/error.h"
-#include "core/job_board.h"
 #include "gpu/gpu_view.h"
 #include "rt/passes/pass.h"
 #include "rt/passes/path_vertex.h"
@@ -96,12 +94,6 @@ struct GpuTile {
   std::uint32_t padding = 0;
 };
 
-struct Constants {
-  std::uint64_t input;
-  std::uint32_t tile_count;
-  std::uint32_t padding;
-};
-
 /// As light_state.glsl counts rays; behind them the pixels that are not done, and rays that were cut.
 constexpr std::array kCountedPasses{PassId::Shadow, PassId::Reflection, PassId::Refraction, PassId::AmbientOcclusion,
                                     PassId::Gather};
@@ -124,15 +116,8 @@ constexpr int kMaxLightSamples = 64;
 /// The steps of light, in the order of a vertex.
 enum Step : std::size_t { Start, Vertex, Direct, Ambient, Photons, Follow, Finish };
 
-struct StepInfo {
-  std::string_view name;
-  std::span<const std::uint32_t> shader;
-  std::span<const std::uint32_t> plain_shader;  ///< for scenes without extensions of materials
-  std::optional<PassId> pass = {};              ///< runs only where this one does
-};
-
 /// By step.
-std::array<StepInfo, 7> steps() {
+std::array<GpuStep, 7> steps() {
   return {{{"device start", light_start, light_start_plain},
            {"device vertex", light_vertex, light_vertex_plain},
            {"device direct", light_direct, light_direct_plain},
@@ -140,6 +125,12 @@ std::array<StepInfo, 7> steps() {
            {"device photons", light_photons, light_photons_plain, PassId::Photon},
            {"device follow", light_follow, light_follow_plain},
            {"device finish", light_finish, light_finish_plain}}};
+}
+
+/// Null where all surfaces cover what is behind them.
+std::unique_ptr<GpuScene> alpha_tested_of(const GpuDevice& device, const Scene& scene, int threads) {
+  const std::vector<SurfaceRange> surfaces = covering_surfaces(scene, true);
+  return surfaces.empty() ? nullptr : std::make_unique<GpuScene>(device, scene, surfaces, threads);
 }
 
 bool has_extensions(const Scene& scene) {
@@ -212,40 +203,27 @@ GpuTileShader::GpuTileShader(const GpuDevice& device, const ShadingInputs& input
     : device_(device),
       inputs_(inputs),
       scene_(device, inputs.scene, covering_surfaces(inputs.scene, false), threads),
+      alpha_tested_(alpha_tested_of(device, inputs.scene, threads)),
       surfaces_(device, inputs.scene, inputs.surfaces),
       materials_(device, inputs.scene),
       lights_(device, inputs.scene, inputs.lights, materials_),
       photons_(device),
       input_(device, sizeof(GpuLightInput), GpuMemory::Upload),
       counters_(device, kCounters * sizeof(std::uint32_t), GpuMemory::Readback),
-      batch_(device) {
-  const auto with_alpha = covering_surfaces(inputs.scene, true);
-  if (!with_alpha.empty()) alpha_tested_.emplace(device, inputs.scene, with_alpha, threads);
+      steps_(device, steps(),
+             {.extended = has_extensions(inputs.scene),
+              .variant = alpha_tested_ ? 1U : 0U,
+              .input = input_.address(),
+              .plan = inputs.plan}) {
   max_waiting_ = kMaxWaiting + (alpha_tested_ ? kMaxLayers : 0);
   const bool extended = has_extensions(inputs.scene);
-  for (const StepInfo& step : steps()) {
-    const auto shader = extended ? step.shader : step.plain_shader;
-    const bool runs = !step.pass || runs_pass(inputs.plan, *step.pass);
-    const std::uint32_t has_coverage = alpha_tested_ ? 1 : 0;
-    kernels_.push_back(runs ? &device.kernel(shader, sizeof(Constants), has_coverage) : nullptr);
-    times_.push_back({std::string(step.name), 0.0, step.pass});
-  }
   const auto layout = extended ? steps()[Vertex].shader : steps()[Vertex].plain_shader;
   state_bytes_ = array_stride(layout, "PixelState");
   waiting_bytes_ = max_waiting_ * array_stride(layout, "FoundVertex");
   tiles_at_once_ = tiles_at_once(device.info(), kTilePixels * (state_bytes_ + waiting_bytes_));
-  compile();
   if (runs_pass(inputs.plan, PassId::Photon) && refusal_of_photons(inputs.scene).empty()) {
     const GpuPhotonInputs traced{scene_.address(), surfaces_.address(), materials_.address(), lights_.address()};
     photon_tracer_ = std::make_unique<GpuPhotonTracer>(device, traced, extended);
-  }
-}
-
-/// Each for itself, as waits have a limit.
-void GpuTileShader::compile() {
-  if (!device_.info().software) return;
-  for (const GpuKernel* kernel : kernels_) {
-    if (kernel != nullptr) batch_.compile(*kernel, Constants{input_.address(), 0, 0});
   }
 }
 
@@ -256,10 +234,6 @@ void GpuTileShader::grow(std::size_t tiles, std::size_t views) {
   grow_to(device_, tiles_, tiles * sizeof(GpuTile), GpuMemory::Upload);
   grow_to(device_, states_, tiles * kTilePixels * state_bytes_, GpuMemory::Device);
   grow_to(device_, waiting_, tiles * kTilePixels * waiting_bytes_, GpuMemory::Device);
-}
-
-void GpuTileShader::clear_times() {
-  for (PassTime& step : times_) step.ms = 0.0;
 }
 
 /// Puts the photons of a sample on the device, once.
@@ -286,21 +260,8 @@ void GpuTileShader::shade(const TilesToShade& lit, RayCounts& counts, const Stor
   }
 }
 
-/// Where its pass runs.
 void GpuTileShader::run_step(std::size_t step, std::size_t tiles) {
-  if (kernels_[step] == nullptr) return;
-  batch_.begin_pass(times_[step].name);
-  batch_.run(*kernels_[step], tiles * kTilePixels, Constants{input_.address(), static_cast<std::uint32_t>(tiles), 0});
-}
-
-void GpuTileShader::finish_batch() {
-  batch_.submit();
-  batch_.wait();
-  report_step();
-  for (const GpuPassTime& time : batch_.times()) {
-    const auto step = std::ranges::find(times_, time.pass, &PassTime::name);
-    if (step != times_.end()) step->ms += time.ms;
-  }
+  steps_.run(step, tiles * kTilePixels, tiles);
 }
 
 /// Shades vertex after vertex of all pixels' paths, until none waits; false where that was overtaken.
@@ -316,7 +277,7 @@ bool GpuTileShader::follow_paths(std::size_t tiles, bool with_photons, const std
       if (with_photons) run_step(Photons, tiles);
       run_step(Follow, tiles);
     }
-    finish_batch();
+    steps_.finish();
     if (waiting == 0) return true;
     if (is_overtaken && is_overtaken()) return false;
   }
@@ -330,11 +291,11 @@ bool GpuTileShader::light(const GpuLightInput& input, std::size_t tiles, const s
   if (!follow_paths(tiles, input.photons != 0, is_overtaken)) return false;
   run_step(Finish, tiles);
   if (input.points != 0) {
-    batch_.copy(*point_lights_, *read_lights_, tiles * kTilePixels * sizeof(PointLight));
+    steps_.batch().copy(*point_lights_, *read_lights_, tiles * kTilePixels * sizeof(PointLight));
   } else {
-    batch_.copy(*pixels_, *read_, tiles * kTilePixels * sizeof(glm::vec4));
+    steps_.batch().copy(*pixels_, *read_, tiles * kTilePixels * sizeof(glm::vec4));
   }
-  finish_batch();
+  steps_.finish();
   for (std::size_t i = 0; i < kCountedPasses.size(); ++i) {
     counts[kCountedPasses.at(i)] += counters_.mapped<std::uint32_t>()[i];
   }

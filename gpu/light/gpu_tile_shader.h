@@ -9,15 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "gpu/device/gpu_batch.h"
 #include "gpu/device/gpu_buffer.h"
 #include "gpu/device/gpu_device.h"
-#include "gpu/device/gpu_kernel.h"
 #include "gpu/gpu_scene.h"
 #include "gpu/light/gpu_lights.h"
 #include "gpu/light/gpu_materials.h"
 #include "gpu/light/gpu_photon_tracer.h"
 #include "gpu/light/gpu_photons.h"
+#include "gpu/light/gpu_steps.h"
 #include "gpu/light/gpu_surfaces.h"
 #include "rt/tile_shader.h"
 
@@ -36,13 +35,11 @@ class GpuTileShader final : public TileShader {
   void shade(const TilesToShade& lit, RayCounts& counts, const Store& store) override;
   void shade_points(const PointsToShade& lit, RayCounts& counts) override;
   [[nodiscard]] PhotonDevice* photon_device() override { return photon_tracer_.get(); }
-  [[nodiscard]] std::span<const PassTime> times() const override { return times_; }
-  void clear_times() override;
+  [[nodiscard]] std::span<const PassTime> times() const override { return steps_.times(); }
+  void clear_times() override { steps_.clear_times(); }
 
  private:
-  void compile();
   void run_step(std::size_t step, std::size_t tiles);
-  void finish_batch();
   void grow(std::size_t tiles, std::size_t views);
   void hold_photons(const PhotonMaps* maps, const SampleNumber& number);
   void put_view(std::size_t i, const View& view, const Media& media);
@@ -57,15 +54,13 @@ class GpuTileShader final : public TileShader {
 
   const GpuDevice& device_;
   ShadingInputs inputs_;
-  GpuScene scene_;                             ///< surfaces that cover all behind them
-  std::optional<GpuScene> alpha_tested_ = {};  ///< the others, where there are some
+  GpuScene scene_;                          ///< surfaces that cover all behind them
+  std::unique_ptr<GpuScene> alpha_tested_;  ///< the others, where there are some
   GpuSurfaces surfaces_;
   GpuMaterials materials_;
   GpuLights lights_;
   GpuPhotons photons_;
   std::optional<SampleNumber> held_photons_ = {};  ///< the sample whose photons those are
-  std::vector<const GpuKernel*> kernels_;          ///< by step; null where its pass does not run
-  std::vector<PassTime> times_;                    ///< by step
   std::uint32_t max_waiting_ = 0;                  ///< vertices of a pixel
   std::size_t state_bytes_ = 0;                    ///< of a pixel while it is lit
   std::size_t waiting_bytes_ = 0;                  ///< of the vertices that may wait for it
@@ -84,7 +79,7 @@ class GpuTileShader final : public TileShader {
   std::optional<GpuBuffer> point_lights_;
   std::optional<GpuBuffer> read_lights_;
   std::unique_ptr<GpuPhotonTracer> photon_tracer_;  ///< null where the CPU traces photons, or nobody
-  GpuBatch batch_;
+  GpuSteps steps_;
 };
 
 /// How many tiles a device lights together, each of which takes so much of its memory meanwhile.

@@ -311,7 +311,7 @@ Scene veiled_room() {
   return scene;
 }
 
-TEST_F(GpuTileShaderTest, LooksThroughSurfacesThatCoverInPart) {
+TEST_F(GpuTileShaderTest, LightsAlphaMaskAndBlend) {
   const Scene scene = veiled_room();
   const View view = view_of(scene, {48, 36});
   RaySettings settings = plain_settings();

@@ -70,3 +70,8 @@ bool is_followed(Bsdf b, uint lobe, double glossy_cutoff) {
   if (lobe == kTransmission || lobe == kDiffuseTransmission) return true;
   return lobe != kDiffuse && (bsdf_roughness(b, lobe) < glossy_cutoff || bsdf_is_delta(b, lobe));
 }
+
+// Whether photons light the lobe.
+bool takes_photons(Bsdf b, uint lobe, double glossy_cutoff) {
+  return bsdf_present(b, lobe) && !is_followed(b, lobe, glossy_cutoff);
+}

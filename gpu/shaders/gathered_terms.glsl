@@ -3,8 +3,8 @@
 // Bsdf::reflection_terms() of the lobes that photons light.
 ReflectionTerms gathered_terms(Bsdf bsdf, double glossy_cutoff) {
   PlainBsdf b = bsdf.plain;
-  bool diffuse = bsdf_present(bsdf, kDiffuse) && !is_followed(bsdf, kDiffuse, glossy_cutoff);
-  bool specular = bsdf_present(bsdf, kReflection) && !is_followed(bsdf, kReflection, glossy_cutoff);
+  bool diffuse = takes_photons(bsdf, kDiffuse, glossy_cutoff);
+  bool specular = takes_photons(bsdf, kReflection, glossy_cutoff);
   ReflectionTerms terms = ReflectionTerms(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, 1.0, 1.0, 0.0, 0.0,
                                           0.0, 0.0, false);
   if (!b.scatters) return terms;
@@ -53,7 +53,7 @@ dvec3 gathered_light(PhotonMaps photons, PhotonUse use, SurfacePoint surface, Bs
   }
   uint lobes = 0u;
   for (uint lobe = 0u; lobe < kLobes; ++lobe) {
-    if (!is_followed(bsdf, lobe, glossy_cutoff) && bsdf_present(bsdf, lobe)) lobes |= 1u << lobe;
+    if (takes_photons(bsdf, lobe, glossy_cutoff)) lobes |= 1u << lobe;
   }
   dvec3 light = dvec3(0.0lf);
   if (lobes == 0u) return light;

@@ -55,10 +55,9 @@ struct PathLimits {
   double near;  // of photons, metres
   uint max_depth;
   uint followed;  // bits: lobes that a pass follows
-  uint gathers;   // whether rays follow the others too: as below
+  uint gathers;   // whether rays follow the others too: 0: no; 1: all the way; or kGathersPhotons
   uint padding;
 };
-const uint kGathersByRays = 1u;
 const uint kGathersPhotons = 2u;  // of rays that gather, photons tell what comes from afar
 
 double in_single(double x) {

@@ -25,9 +25,9 @@ uint to_bits(double x, uint bits) {
   return uint(is_negative(scaled) ? -size : size) & ((1u << bits) - 1u);
 }
 
-bool takes_photons(Bsdf bsdf) {
+bool any_takes_photons(Bsdf bsdf) {
   for (uint lobe = 0u; lobe < kLobes; ++lobe) {
-    if (bsdf_present(bsdf, lobe) && !is_followed(bsdf, lobe, work.glossy_cutoff)) return true;
+    if (takes_photons(bsdf, lobe, work.glossy_cutoff)) return true;
   }
   return false;
 }
@@ -66,7 +66,7 @@ bool make_bsdfs(SurfacePoint surface, MaterialPoint material, PhotonFlight fligh
       continue;
     }
     work.states.states[photon].arrival.bsdf = bsdf;
-    if (flight.bounces > 0u && has_light && takes_photons(bsdf)) keep(flight, flight.flux, surface, slot);
+    if (flight.bounces > 0u && has_light && any_takes_photons(bsdf)) keep(flight, flight.flux, surface, slot);
     if (!has_light) return false;
   }
   return true;
